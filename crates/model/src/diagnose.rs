@@ -1,0 +1,84 @@
+//! What every error of espalier can say about itself.
+
+/// The class of an error, which decides the exit code of the program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Class {
+    /// A bug of ours.
+    Internal,
+    /// Wrong usage or configuration.
+    Usage,
+    /// The input is malformed or holds nothing to work on.
+    Input,
+    /// A stated limit would be exceeded.
+    Limit,
+    /// The topology is refused by policy.
+    Topology,
+    /// No certified layout, or a verification failed.
+    Uncertified,
+    /// An output cannot be created.
+    CannotCreate,
+    /// A file is missing, unreadable, or the disk fails.
+    Io,
+    /// Another run holds the folder.
+    Locked,
+}
+
+impl Class {
+    /// The exit code of the program for this class.
+    #[must_use]
+    pub fn exit_code(self) -> u8 {
+        match self {
+            Self::Internal => 1,
+            Self::Usage => 2,
+            Self::Input => 3,
+            Self::Limit => 5,
+            Self::Topology => 6,
+            Self::Uncertified => 8,
+            Self::CannotCreate => 73,
+            Self::Io => 74,
+            Self::Locked => 75,
+        }
+    }
+}
+
+/// An error that names its code, its class and the way out. Its `Display` names the place and the cause.
+pub trait Diagnose: std::error::Error {
+    /// A short stable code such as `E-NIFTI-TRUNCATED`.
+    fn code(&self) -> &'static str;
+    /// The class, hence the exit code.
+    fn class(&self) -> Class;
+    /// What the user can do about it; empty where the message says it all.
+    fn hint(&self) -> String {
+        String::new()
+    }
+}
+
+/// A parameter outside its range. The runner finds the line of `key` in the config.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{key}: {message}")]
+pub struct ParamError {
+    /// The key inside the stage's table, such as `particles`.
+    pub key: &'static str,
+    /// What is wrong with its value, with the range allowed: `must be at least 2, is 0`.
+    pub message: String,
+}
+
+impl ParamError {
+    /// An error at `key` unless `is_legal`.
+    ///
+    /// # Errors
+    /// If not `is_legal`.
+    pub fn check(key: &'static str, is_legal: bool, message: impl Into<String>) -> Result<(), Self> {
+        if is_legal { Ok(()) } else { Err(Self { key, message: message.into() }) }
+    }
+}
+
+impl Diagnose for ParamError {
+    fn code(&self) -> &'static str {
+        "E-PARAM"
+    }
+
+    fn class(&self) -> Class {
+        Class::Usage
+    }
+}

@@ -1,0 +1,185 @@
+//! A tree laid flat.
+
+use glam::DVec2;
+
+/// Where target angles come from (section 3.2.1 of [Hu2022]).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TargetKind {
+    /// The exact angle in three dimensions; the local plane only tells the side.
+    #[default]
+    Intrinsic,
+    /// The paper's: the angle measured in the local plane.
+    Projected,
+}
+
+/// What an embedding aims at, by node; frozen before any method runs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Targets {
+    /// How they were made.
+    pub kind: TargetKind,
+    /// The target node angle θ in (0, 2π): counter-clockwise from (parent → grandparent) to (parent → node),
+    /// π = straight. For a child of the root the grandparent is virtual, in the middle of the largest gap, and
+    /// no loss is counted. `NaN` for the root.
+    pub angle_rad: Vec<f64>,
+    /// The target edge length: the length in three dimensions, in mm. 0 for the root.
+    pub length_mm: Vec<f64>,
+    /// The heading of the edge in the global view, radians counter-clockwise from right; 0 for the root.
+    pub heading_rad: Vec<f64>,
+    /// How far the global view can tell that heading: projected length / length, in [0, 1]; 0 for the root.
+    pub confidence: Vec<f64>,
+}
+
+/// The one energy by which every method is judged (section 3.2.2 of [Hu2022], Eq. 4), by parts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energy {
+    /// Σ over branches of w_l · mean r_l².
+    pub length: f64,
+    /// Σ over branches of w_a · mean r_a².
+    pub angle: f64,
+    /// The relative placement term, ours: w_g (M/L) Σ conf² l (h − H)².
+    pub placement: f64,
+    /// w_X · crossings.
+    pub crossing: f64,
+}
+
+impl Energy {
+    /// The sum of the parts.
+    #[must_use]
+    pub fn total(&self) -> f64 {
+        self.length + self.angle + self.placement + self.crossing
+    }
+}
+
+/// What a layout loses (section 5.1.1 of [Hu2022], and more). Means are over nodes that have the quantity.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Losses {
+    /// Metric 1: mean of |l − l_e| / l.
+    pub length_loss_mean: f64,
+    /// Metric 1: maximum of |l − l_e| / l.
+    pub length_loss_max: f64,
+    /// Metric 1: mean of |θ − θ_e| / θ against the targets.
+    pub angle_loss_mean: f64,
+    /// Metric 1: maximum of |θ − θ_e| / θ.
+    pub angle_loss_max: f64,
+    /// Metric 2: mean of |φ − φ_e| / φ, φ the interior angle in three dimensions, guarded at 5°.
+    pub angle3d_loss_mean: f64,
+    /// Metric 2: maximum.
+    pub angle3d_loss_max: f64,
+    /// Mean of |φ − φ_e| in degrees.
+    pub angle3d_error_mean_deg: f64,
+    /// Maximum of |φ − φ_e| in degrees.
+    pub angle3d_error_max_deg: f64,
+    /// Kruskal stress of node distances, plane against space.
+    pub stress: f64,
+    /// Spearman rank correlation of node distances, plane against space.
+    pub spearman: f64,
+}
+
+/// The statement that an embedding has no crossings, or where it has them: exact, over the written coordinates.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Certificate {
+    /// How many pairs of edges have a point in common that they should not have.
+    pub crossings: usize,
+    /// The first such pairs, each edge by its lower node, at most [`Certificate::MAX_PAIRS`].
+    pub pairs: Vec<(usize, usize)>,
+}
+
+impl Certificate {
+    /// How many pairs are kept.
+    pub const MAX_PAIRS: usize = 100;
+
+    /// Whether the embedding is free of crossings.
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        self.crossings == 0
+    }
+}
+
+/// The rigid motion (and mirror) of the whole that was applied last.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pose {
+    /// Rotation counter-clockwise in radians, applied after the reflection.
+    pub rotation_rad: f64,
+    /// Whether the whole was reflected (x → −x).
+    pub is_reflected: bool,
+}
+
+/// Why an optimisation ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Termination {
+    /// Nothing to optimise, or a constructive method.
+    #[default]
+    Constructed,
+    /// The energy is zero: proven optimal for its targets.
+    Optimal,
+    /// The work allowed was done.
+    BudgetSpent,
+}
+
+/// One point of the convergence curve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TracePoint {
+    /// The iteration; 0 is the start.
+    pub iteration: u32,
+    /// Evaluations of the energy so far.
+    pub evaluations: u64,
+    /// The best total energy so far.
+    pub energy: f64,
+    /// The crossings of that best.
+    pub crossings: usize,
+}
+
+/// One method's row in `compare.tsv`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MethodRow {
+    /// The method's name, such as `radial`, with its size where that matters.
+    pub method: String,
+    /// Crossings, exact.
+    pub crossings: usize,
+    /// Pairs of edges that are not neighbours and overlap at their radii.
+    pub overlaps: usize,
+    /// The one energy.
+    pub energy: Energy,
+    /// The losses.
+    pub losses: Losses,
+    /// Evaluations of the energy.
+    pub evaluations: u64,
+    /// Against which targets it was scored.
+    pub targets: TargetKind,
+}
+
+/// A tree laid flat.
+///
+/// **Guarantees** one entry per node of its tree in every per-node vector; positions are finite and rounded to
+/// `quantum_mm`, exactly as they are written; the certificate is for these numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Embedding {
+    /// The method whose layout this is.
+    pub method: String,
+    /// The seed it was made with.
+    pub seed: u64,
+    /// Where each node lies, plane mm: x to the right, y up.
+    pub positions_mm: Vec<DVec2>,
+    /// The step to which coordinates are rounded, a power of ten, in mm.
+    pub quantum_mm: f64,
+    /// The targets.
+    pub targets: Targets,
+    /// r_l of each node's edge; 0 for the root.
+    pub length_ratio: Vec<f64>,
+    /// r_a of each node; 0 for the root and its children.
+    pub angle_ratio: Vec<f64>,
+    /// The one energy.
+    pub energy: Energy,
+    /// The losses.
+    pub losses: Losses,
+    /// The certificate.
+    pub certificate: Certificate,
+    /// The last rigid motion.
+    pub pose: Pose,
+    /// Why it ended.
+    pub termination: Termination,
+    /// The convergence curve of the optimiser that made it; empty for constructive methods.
+    pub trace: Vec<TracePoint>,
+    /// All methods that ran, scored alike, this one among them.
+    pub methods: Vec<MethodRow>,
+}

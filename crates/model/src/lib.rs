@@ -1,0 +1,50 @@
+//! The hand-over types between stages, with their invariants and their files.
+//!
+//! | type | made by | used by | file |
+//! |---|---|---|---|
+//! | [`Volume`] | `volume`, `phantom` | `volume` | `.nii.gz` |
+//! | [`Mask`] | `volume`, `phantom` | `skeleton`, `radius`, `tree` | `mask.nii.gz` |
+//! | [`Skeleton`] | `skeleton` | `radius`, `tree` | `skeleton.nii.gz` |
+//! | [`InscribedSpheres`] | `radius` | `tree` | `spheres.tsv`, `radius.nii.gz` |
+//! | [`swc::Traced`] | a tracing program, `phantom` | `tree` | `.swc` |
+//! | [`Tree`] | `tree` | `views`, `embed`, `render` | `tree.swc` |
+//! | [`Ledger`] | `tree` | the reader | `topology.tsv` |
+//! | [`ViewHierarchy`] | `views` | `embed`, `render` | `views.json` |
+//! | [`Embedding`] | `embed` | `render` | `embedding.json` |
+//! | [`Report`] | every stage | the reader | `report.json` |
+//!
+//! **Spaces** World points are RAS+ mm; voxel coordinates are (x, y, z) with the voxel's centre at whole
+//! numbers; picture points are plane mm.
+//!
+//! **Architecture Invariant:** no algorithms here, and no file access: files are bytes in and bytes out.
+
+pub mod diagnose;
+mod embedding;
+mod grid;
+mod ledger;
+mod mask;
+pub mod nifti_out;
+mod report;
+mod skeleton;
+mod spheres;
+pub mod swc;
+pub mod table;
+mod tree;
+mod versioned;
+mod views;
+mod volume;
+
+pub use diagnose::Diagnose;
+pub use embedding::{
+    Certificate, Embedding, Energy, Losses, MethodRow, Pose, TargetKind, Targets, Termination, TracePoint,
+};
+pub use grid::{Grid, GridError};
+pub use ledger::{Ledger, LedgerEntry, LedgerKind};
+pub use mask::Mask;
+pub use report::{Count, Report, Warning};
+pub use skeleton::Skeleton;
+pub use spheres::{InscribedSpheres, Sphere};
+pub use tree::{Branch, Branches, Node, Tree, TreeError};
+pub use versioned::FileError;
+pub use views::{LocalPlane, SubtreeView, View, ViewHierarchy};
+pub use volume::{Volume, Voxels};

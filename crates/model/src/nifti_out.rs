@@ -1,0 +1,1 @@
+//! NIfTI-1 out: `.nii.gz` bytes of masks and volumes.

@@ -1,0 +1,100 @@
+//! Versioned JSON files: every file names its format and version, and a reader refuses what it does not know.
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::diagnose::{Class, Diagnose};
+
+/// Why a stage file cannot be used.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum FileError {
+    /// Not JSON, or not of this shape.
+    #[error("not a readable {format} file: {source}")]
+    Malformed {
+        /// The format expected.
+        format: &'static str,
+        /// What the parser found, with line and column.
+        source: serde_json::Error,
+    },
+    /// Another format, or another version of it.
+    #[error("a file of format {found_format} version {found_version}, expected {format} version {version}")]
+    Unknown {
+        /// The format expected.
+        format: &'static str,
+        /// The version expected.
+        version: u32,
+        /// The format found.
+        found_format: String,
+        /// The version found.
+        found_version: u32,
+    },
+    /// Well formed, but an invariant of the data does not hold.
+    #[error("{format} file breaks an invariant: {what}")]
+    Invalid {
+        /// The format expected.
+        format: &'static str,
+        /// The invariant and the place.
+        what: String,
+    },
+}
+
+impl Diagnose for FileError {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::Malformed { .. } => "E-FILE-MALFORMED",
+            Self::Unknown { .. } => "E-FILE-VERSION",
+            Self::Invalid { .. } => "E-FILE-INVALID",
+        }
+    }
+
+    fn class(&self) -> Class {
+        Class::Input
+    }
+
+    fn hint(&self) -> String {
+        "write the file again with this version of espalier: run the stage that makes it".to_owned()
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+struct Envelope<T> {
+    format: String,
+    version: u32,
+    #[serde(flatten)]
+    body: T,
+}
+
+#[derive(Deserialize)]
+struct EnvelopeHead {
+    format: String,
+    version: u32,
+}
+
+/// The JSON text of `body` under its format and version.
+pub(crate) fn to_json<T: Serialize>(format: &'static str, version: u32, body: T) -> String {
+    let envelope = Envelope { format: format.to_owned(), version, body };
+    // Plain structs of numbers, strings and vectors: serialisation cannot fail.
+    serde_json::to_string(&envelope).unwrap_or_default() + "\n"
+}
+
+/// The body of a JSON text, if its format and version are the expected ones.
+pub(crate) fn from_json<T: DeserializeOwned>(
+    format: &'static str,
+    version: u32,
+    text: &str,
+) -> Result<T, FileError> {
+    let malformed = |source| FileError::Malformed { format, source };
+    let head: EnvelopeHead = serde_json::from_str(text).map_err(malformed)?;
+    if head.format != format || head.version != version {
+        return Err(FileError::Unknown {
+            format,
+            version,
+            found_format: head.format,
+            found_version: head.version,
+        });
+    }
+    let envelope: Envelope<T> = serde_json::from_str(text).map_err(malformed)?;
+    Ok(envelope.body)
+}

@@ -1,0 +1,106 @@
+//! A scalar volume: CT, label map or mask as it stands in a file.
+
+use ndarray::Array3;
+
+use crate::Grid;
+
+/// The stored numbers of a volume, shape (nz, ny, nx), x fastest.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Voxels {
+    /// 8 bits, unsigned.
+    U8(Array3<u8>),
+    /// 16 bits, signed: the usual CT.
+    I16(Array3<i16>),
+    /// 16 bits, unsigned.
+    U16(Array3<u16>),
+    /// 32 bits, signed.
+    I32(Array3<i32>),
+    /// 32 bits, unsigned: label maps.
+    U32(Array3<u32>),
+    /// Single precision.
+    F32(Array3<f32>),
+    /// Double precision; also 64-bit integers, exact up to 2⁵³.
+    F64(Array3<f64>),
+}
+
+/// Runs `$body` with `$array` bound to the typed array, whatever its type.
+macro_rules! with_array {
+    ($voxels:expr, $array:ident => $body:expr) => {
+        match $voxels {
+            Voxels::U8($array) => $body,
+            Voxels::I16($array) => $body,
+            Voxels::U16($array) => $body,
+            Voxels::I32($array) => $body,
+            Voxels::U32($array) => $body,
+            Voxels::F32($array) => $body,
+            Voxels::F64($array) => $body,
+        }
+    };
+}
+
+/// A scalar volume on a grid. A voxel's value is `slope · stored + intercept`.
+///
+/// **Guarantees** the array has the grid's shape, in standard layout; slope and intercept are finite, the slope
+/// not zero.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Volume {
+    grid: Grid,
+    voxels: Voxels,
+    slope: f64,
+    intercept: f64,
+}
+
+#[allow(clippy::unnecessary_cast, reason = "one arm of `with_array` is f64 already")]
+impl Volume {
+    /// A volume of stored numbers and their scaling (HU for CT: usually 1 and 0).
+    ///
+    /// # Panics
+    /// If the array has not the grid's shape or the scaling is not legal: a mistake of the caller's code, since
+    /// readers check both at the door.
+    #[must_use]
+    pub fn new(grid: Grid, voxels: Voxels, slope: f64, intercept: f64) -> Self {
+        let [nx, ny, nz] = grid.shape();
+        let is_standard = with_array!(&voxels, a => a.dim() == (nz, ny, nx) && a.is_standard_layout());
+        assert!(is_standard, "volume array does not match its grid");
+        assert!(slope.is_finite() && slope != 0.0 && intercept.is_finite(), "scaling {slope}, {intercept}");
+        Self { grid, voxels, slope, intercept }
+    }
+
+    /// The grid.
+    #[must_use]
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// The stored numbers.
+    #[must_use]
+    pub fn voxels(&self) -> &Voxels {
+        &self.voxels
+    }
+
+    /// Slope and intercept of the scaling.
+    #[must_use]
+    pub fn scaling(&self) -> (f64, f64) {
+        (self.slope, self.intercept)
+    }
+
+    /// The scaled value at a flat index (x fastest).
+    #[must_use]
+    pub fn value(&self, index: usize) -> f64 {
+        let stored = with_array!(&self.voxels, a => a.as_slice().map_or(f64::NAN, |s| s[index] as f64));
+        self.slope * stored + self.intercept
+    }
+
+    /// Calls `visit` with each scaled value in storage order (x fastest, z slowest).
+    pub fn for_each_value(&self, mut visit: impl FnMut(f64)) {
+        with_array!(&self.voxels, a => a.iter().for_each(|&v| visit(self.slope * v as f64 + self.intercept)));
+    }
+
+    /// The scaled values as a flat vector in storage order (x fastest), mapped by `map`.
+    #[must_use]
+    pub fn map_values<T>(&self, mut map: impl FnMut(f64) -> T) -> Vec<T> {
+        let mut out = Vec::with_capacity(self.grid.n_voxels());
+        self.for_each_value(|value| out.push(map(value)));
+        out
+    }
+}
