@@ -119,7 +119,7 @@ fn check_scale(scale: &SwcScale) -> Result<(), SwcError> {
 fn refuse_nul(text: &[u8]) -> Result<(), SwcError> {
     match text.iter().position(|&byte| byte == 0) {
         None => Ok(()),
-        Some(offset) => Err(SwcError::Binary { line: lines(&text[..offset]).count().max(1), offset }),
+        Some(offset) => Err(SwcError::Binary { line: lines(&text[..=offset]).count(), offset }),
     }
 }
 
