@@ -1,1 +1,67 @@
-//! To be written.
+//! Thinning: a mask in, the voxels of its curve skeleton out.
+//!
+//! | step | file | what |
+//! |--:|---|---|
+//! | 1 | `lattice` | crop the mask to its foreground, turn its axes to RAS, pad it with background |
+//! | 2 | `euler`, `simple` | what a voxel's 26 neighbours say: end point, Euler invariance, simplicity |
+//! | 3 | `thinning` | peel border voxels from six sides until nothing changes |
+//! | 4 | `topology` | count components and the Euler number before and after, for the report |
+//!
+//! Connectivity is 26 for the foreground and 6 for the background throughout.
+//!
+//! ```
+//! use espalier_model::{Grid, Mask};
+//! use espalier_skeleton::{Params, skeletonize};
+//! let grid = Grid::axis_aligned([20, 3, 3], glam::DVec3::ONE, glam::DVec3::ZERO)?;
+//! let bar = Mask::new(grid.clone(), vec![true; 180]);
+//! let thinned = skeletonize(&bar, &Params::default())?;
+//! assert!(thinned.skeleton.voxels().iter().all(|&[_, y, z]| (y, z) == (1, 1)));
+//! assert!(skeletonize(&Mask::empty(grid), &Params::default()).is_err());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod error;
+mod euler;
+mod lattice;
+mod params;
+mod simple;
+mod thinning;
+mod topology;
+
+use espalier_model::{Mask, Report, Skeleton};
+
+pub use error::Error;
+pub use params::{Orientation, Params, Thinning};
+
+use lattice::Lattice;
+
+/// A curve skeleton and what its making did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Skeletonized {
+    /// The skeleton's voxels, in the mask's own grid.
+    pub skeleton: Skeleton,
+    /// Counts `foreground_voxels`, `skeleton_voxels`, `sweeps`, `skeleton_endpoints`, `mask_components`,
+    /// `skeleton_components`, `mask_euler_number`, `skeleton_euler_number`; a warning if the topology changed.
+    pub report: Report,
+}
+
+/// The curve skeleton of `mask`.
+///
+/// # Errors
+/// [`Error::EmptyMask`] if there is no foreground.
+pub fn skeletonize(mask: &Mask, params: &Params) -> Result<Skeletonized, Error> {
+    let mut lattice = Lattice::from_mask(mask, params.orientation).ok_or(Error::EmptyMask)?;
+    let mut report = Report::default();
+    let mask_topology = topology::measure(&mut lattice);
+    report.count_usize("foreground_voxels", lattice.foreground().len());
+
+    let n_sweeps = thinning::thin(&mut lattice, params.thinning);
+
+    let skeleton_topology = topology::measure(&mut lattice);
+    let skeleton = Skeleton::new(mask.grid().clone(), lattice.stored_voxels());
+    report.count_usize("skeleton_voxels", skeleton.voxels().len());
+    report.count_usize("sweeps", n_sweeps);
+    report.count_usize("skeleton_endpoints", skeleton_topology.n_endpoints);
+    topology::compare(&mask_topology, &skeleton_topology, &mut report);
+    Ok(Skeletonized { skeleton, report })
+}

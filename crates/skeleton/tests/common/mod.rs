@@ -1,0 +1,43 @@
+//! Shared by the test files: a reader for the NIfTI files of the test data, and phantoms.
+#![allow(dead_code, reason = "each test file uses its own part")]
+#![allow(clippy::disallowed_methods, reason = "tests find the real data by ESPALIER_DATA")]
+
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use espalier_model::{Grid, Mask};
+use glam::DVec3;
+
+/// The folder of real data; `None`, said aloud, if the environment names none.
+pub fn data_folder() -> Option<PathBuf> {
+    let folder = std::env::var("ESPALIER_DATA").ok().filter(|folder| !folder.is_empty()).map(PathBuf::from);
+    if folder.is_none() {
+        println!("skipped: ESPALIER_DATA not set");
+    }
+    folder
+}
+
+/// A mask of the nonzero voxels of a little-endian 8- or 16-bit NIfTI-1 file, with its spacing but no other
+/// geometry.
+pub fn read_mask(path: &Path) -> Mask {
+    let compressed = std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let mut bytes = Vec::new();
+    flate2::read::MultiGzDecoder::new(&compressed[..]).read_to_end(&mut bytes).expect("gzip");
+    let short = |at: usize| i16::from_le_bytes([bytes[at], bytes[at + 1]]);
+    let float = |at: usize| f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
+    let shape = [42, 44, 46].map(|at| usize::try_from(short(at)).expect("extent"));
+    let spacing = DVec3::from_array([80, 84, 88].map(|at| f64::from(float(at))));
+    let grid = Grid::axis_aligned(shape, spacing, DVec3::ZERO).expect("grid");
+    let width = usize::try_from(short(72)).expect("bitpix") / 8;
+    let body = &bytes[float(108) as usize..][..grid.n_voxels() * width];
+    Mask::new(grid, body.chunks_exact(width).map(|voxel| voxel.iter().any(|&byte| byte != 0)).collect())
+}
+
+/// A mask on a grid of spacing 1 from a predicate of the voxel coordinates.
+pub fn mask_of(shape: [usize; 3], inside: impl Fn(DVec3) -> bool) -> Mask {
+    let grid = Grid::axis_aligned(shape, DVec3::ONE, DVec3::ZERO).expect("grid");
+    let voxels = (0..grid.n_voxels())
+        .map(|index| inside(DVec3::from_array(grid.voxel(index).map(|c| c as f64))))
+        .collect();
+    Mask::new(grid, voxels)
+}
