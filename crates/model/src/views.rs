@@ -1,6 +1,14 @@
-//! Views of a tree, and the planes of its parts.
+//! Views of a tree, and the planes of its parts; their file `views.json`.
+//!
+//! **File** JSON, format `espalier-views` version 1: the space, the number of nodes, the global view, the
+//! subtree views, one plane per branch, one plane per fork with its node. Numbers are written with the fewest
+//! digits that read back as the same `f64`, so a file gives the very hierarchy it was written from.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
+use serde::{Deserialize, Serialize};
+
+use crate::tree::Tree;
+use crate::versioned::{self, FileError};
 
 /// An orthographic view of a set of edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,12 +25,26 @@ pub struct View {
     pub loss: f64,
 }
 
+impl View {
+    /// Unit vector that is right in the picture, RAS+.
+    #[must_use]
+    pub fn right(&self) -> DVec3 {
+        self.up.cross(self.towards_camera)
+    }
+
+    /// A vector of the world as the picture shows it: x to the right, y up, in the vector's own unit.
+    #[must_use]
+    pub fn project(&self, vector: DVec3) -> DVec2 {
+        DVec2::new(vector.dot(self.right()), vector.dot(self.up))
+    }
+}
+
 /// The best view of a subtree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SubtreeView {
-    /// The branching depth: 0 for the whole tree.
+    /// The branching depth: 0 for the whole tree, else the number of forks above `root`.
     pub level: u32,
-    /// The node at whose subtree the view looks.
+    /// The node at whose subtree the view looks. Below level 0 the edge from its fork belongs to the subject.
     pub root: usize,
     /// The view.
     pub view: View,
@@ -45,11 +67,292 @@ pub struct LocalPlane {
 pub struct ViewHierarchy {
     /// The best view of the whole tree.
     pub global: View,
-    /// The best view of each subtree below a branching node, level by level, in preorder within a level; the
-    /// first is the whole tree at level 0.
+    /// The best view of each subtree below a branching node that branches again, level by level, in preorder
+    /// within a level; the first is the whole tree at level 0.
     pub subtrees: Vec<SubtreeView>,
     /// The plane of each branch's chain set, by branch index.
     pub chains: Vec<LocalPlane>,
     /// The plane of each fork's branching set, by node index.
     pub forks: Vec<Option<LocalPlane>>,
+}
+
+impl ViewHierarchy {
+    /// The file `views.json`.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        let subtrees = self.subtrees.iter().map(|subtree| SubtreeRecord {
+            level: subtree.level,
+            root: subtree.root,
+            view: ViewRecord::of(&subtree.view),
+        });
+        let forks =
+            self.forks.iter().enumerate().filter_map(|(node, fork)| {
+                fork.map(|plane| ForkRecord { node, plane: PlaneRecord::of(&plane) })
+            });
+        let file = ViewsFile {
+            space: SPACE.to_owned(),
+            n_nodes: self.forks.len(),
+            global: ViewRecord::of(&self.global),
+            subtrees: subtrees.collect(),
+            chains: self.chains.iter().map(PlaneRecord::of).collect(),
+            forks: forks.collect(),
+        };
+        versioned::to_json(FORMAT, VERSION, file)
+    }
+
+    /// The hierarchy of `tree` from its file.
+    ///
+    /// # Errors
+    /// [`FileError`] if the text is no `views.json` of this version, or breaks a guarantee for this tree.
+    pub fn from_json(text: &str, tree: &Tree) -> Result<Self, FileError> {
+        let file: ViewsFile = versioned::from_json(FORMAT, VERSION, text)?;
+        file.check(tree).map_err(|what| FileError::Invalid { format: FORMAT, what })?;
+        let subtrees = file.subtrees.iter().map(|record| SubtreeView {
+            level: record.level,
+            root: record.root,
+            view: record.view.view(),
+        });
+        let mut forks = vec![None; file.n_nodes];
+        for record in &file.forks {
+            forks[record.node] = Some(record.plane.plane());
+        }
+        Ok(Self {
+            global: file.global.view(),
+            subtrees: subtrees.collect(),
+            chains: file.chains.iter().map(PlaneRecord::plane).collect(),
+            forks,
+        })
+    }
+}
+
+const FORMAT: &str = "espalier-views";
+const VERSION: u32 = 1;
+const SPACE: &str = "RAS+ mm";
+
+/// How far from unit length and from the right angle the axes in a file may be: a few roundings.
+const AXIS_TOLERANCE: f64 = 1e-9;
+
+#[derive(Serialize, Deserialize)]
+struct ViewsFile {
+    space: String,
+    n_nodes: usize,
+    global: ViewRecord,
+    subtrees: Vec<SubtreeRecord>,
+    chains: Vec<PlaneRecord>,
+    forks: Vec<ForkRecord>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ViewRecord {
+    towards_camera: [f64; 3],
+    up: [f64; 3],
+    center_mm: [f64; 3],
+    radius_mm: f64,
+    loss: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SubtreeRecord {
+    level: u32,
+    root: usize,
+    view: ViewRecord,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlaneRecord {
+    is_mirrored: bool,
+    view: ViewRecord,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ForkRecord {
+    node: usize,
+    plane: PlaneRecord,
+}
+
+impl ViewRecord {
+    fn of(view: &View) -> Self {
+        Self {
+            towards_camera: view.towards_camera.to_array(),
+            up: view.up.to_array(),
+            center_mm: view.center_mm.to_array(),
+            radius_mm: view.radius_mm,
+            loss: view.loss,
+        }
+    }
+
+    fn view(&self) -> View {
+        View {
+            towards_camera: DVec3::from_array(self.towards_camera),
+            up: DVec3::from_array(self.up),
+            center_mm: DVec3::from_array(self.center_mm),
+            radius_mm: self.radius_mm,
+            loss: self.loss,
+        }
+    }
+
+    fn check(&self, place: &str) -> Result<(), String> {
+        let View { towards_camera, up, center_mm, radius_mm, loss } = self.view();
+        for (name, axis) in [("towards_camera", towards_camera), ("up", up)] {
+            let is_unit = (axis.length() - 1.0).abs() <= AXIS_TOLERANCE;
+            ensure(is_unit, || format!("{name} of {place} is {axis}, not a unit vector"))?;
+        }
+        let slant = up.dot(towards_camera).abs();
+        ensure(slant <= AXIS_TOLERANCE, || format!("up of {place} is not perpendicular to towards_camera"))?;
+        let is_placed =
+            center_mm.is_finite() && radius_mm.is_finite() && radius_mm >= 0.0 && loss.is_finite();
+        ensure(is_placed, || format!("{place} has centre {center_mm} mm, radius {radius_mm} mm, loss {loss}"))
+    }
+}
+
+impl PlaneRecord {
+    fn of(plane: &LocalPlane) -> Self {
+        Self { is_mirrored: plane.is_mirrored, view: ViewRecord::of(&plane.view) }
+    }
+
+    fn plane(&self) -> LocalPlane {
+        LocalPlane { is_mirrored: self.is_mirrored, view: self.view.view() }
+    }
+}
+
+impl ViewsFile {
+    /// Every guarantee of [`ViewHierarchy`] for `tree`, and sound numbers everywhere.
+    fn check(&self, tree: &Tree) -> Result<(), String> {
+        ensure(self.space == SPACE, || format!("space is {:?}, not {SPACE:?}", self.space))?;
+        let n_nodes = tree.n_nodes();
+        ensure(self.n_nodes == n_nodes, || {
+            format!("made for {} nodes, the tree has {n_nodes}", self.n_nodes)
+        })?;
+        let n_branches = tree.branches().list().len();
+        ensure(self.chains.len() == n_branches, || {
+            format!("{} chains, the tree has {n_branches} branches", self.chains.len())
+        })?;
+        let fork_nodes = (0..n_nodes).filter(|&node| tree.children(node).len() > 1);
+        ensure(self.forks.iter().map(|fork| fork.node).eq(fork_nodes), || {
+            "the forks are not the tree's own, in order".to_owned()
+        })?;
+        self.check_subtrees(n_nodes)?;
+
+        self.global.check("the global view")?;
+        for (branch, chain) in self.chains.iter().enumerate() {
+            chain.view.check(&format!("the plane of branch {branch}"))?;
+        }
+        for fork in &self.forks {
+            fork.plane.view.check(&format!("the plane of fork {}", fork.node))?;
+        }
+        Ok(())
+    }
+
+    fn check_subtrees(&self, n_nodes: usize) -> Result<(), String> {
+        let places: Vec<_> = self.subtrees.iter().map(|subtree| (subtree.level, subtree.root)).collect();
+        ensure(places.first() == Some(&(0, 0)), || "the first subtree is not the whole tree".to_owned())?;
+        for (subtree, record) in self.subtrees.iter().enumerate() {
+            let is_in_order = subtree == 0 || places[subtree - 1] < places[subtree];
+            ensure(is_in_order && record.root < n_nodes, || {
+                let (level, root) = places[subtree];
+                format!("subtree {subtree} (level {level}, root {root}) is out of order or outside the tree")
+            })?;
+            record.view.check(&format!("the view of subtree {subtree}"))?;
+        }
+        Ok(())
+    }
+}
+
+fn ensure(holds: bool, what: impl FnOnce() -> String) -> Result<(), String> {
+    if holds { Ok(()) } else { Err(what()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tree::Node;
+
+    fn fork_tree() -> Tree {
+        let node = |x: f64, y: f64, parent| Node {
+            position_mm: DVec3::new(x, y, 0.0),
+            radius_mm: 1.0,
+            parent,
+            kind: 0,
+        };
+        Tree::new(&[
+            node(0.0, 0.0, None),
+            node(1.0, 0.0, Some(0)),
+            node(2.0, 1.0, Some(1)),
+            node(2.0, -1.0, Some(1)),
+        ])
+        .expect("a tree")
+    }
+
+    fn sample() -> ViewHierarchy {
+        let view = View {
+            towards_camera: DVec3::new(0.6, 0.8, 0.0),
+            up: DVec3::Z,
+            center_mm: DVec3::new(0.1, 1.0 / 3.0, -1e-17),
+            radius_mm: 2.0_f64.sqrt(),
+            loss: 1e-300,
+        };
+        let plane = LocalPlane { view, is_mirrored: true };
+        ViewHierarchy {
+            global: view,
+            subtrees: vec![SubtreeView { level: 0, root: 0, view }],
+            chains: vec![plane; 3],
+            forks: vec![None, Some(LocalPlane { is_mirrored: false, ..plane }), None, None],
+        }
+    }
+
+    #[test]
+    fn file_gives_back_the_same_bits() {
+        let read = ViewHierarchy::from_json(&sample().to_json(), &fork_tree()).expect("its own file");
+        assert_eq!(read, sample());
+    }
+
+    #[test]
+    fn file_that_breaks_a_guarantee_is_refused_with_the_place() {
+        let broken = |change: fn(&mut ViewHierarchy)| {
+            let mut views = sample();
+            change(&mut views);
+            ViewHierarchy::from_json(&views.to_json(), &fork_tree()).expect_err("refused").to_string()
+        };
+        let cases: [(fn(&mut ViewHierarchy), &str); 8] = [
+            (|v| v.chains.truncate(2), "2 chains, the tree has 3 branches"),
+            (|v| v.forks[1] = None, "the forks are not the tree's own"),
+            (|v| v.forks.push(None), "made for 5 nodes, the tree has 4"),
+            (|v| v.subtrees.clear(), "the first subtree is not the whole tree"),
+            (|v| v.subtrees.push(v.subtrees[0]), "subtree 1 (level 0, root 0) is out of order"),
+            (|v| v.global.up = DVec3::X, "not perpendicular"),
+            (|v| v.chains[2].view.towards_camera *= 1.01, "branch 2"),
+            (|v| v.global.radius_mm = -1.0, "radius -1 mm"),
+        ];
+        for (change, expected) in cases {
+            let message = broken(change);
+            assert!(message.contains(expected), "{message} should say {expected}");
+        }
+    }
+
+    #[test]
+    fn other_files_are_refused() {
+        let text = sample().to_json();
+        for (from, to, expected) in [
+            ("espalier-views", "espalier-embedding", "expected espalier-views version 1"),
+            ("\"version\":1", "\"version\":2", "version 2"),
+            ("RAS+ mm", "LPS+ mm", "LPS+ mm"),
+            ("\"radius_mm\":", "\"radius_mm\":null,\"x\":", "not a readable"),
+        ] {
+            let other = text.replacen(from, to, 1);
+            let message = ViewHierarchy::from_json(&other, &fork_tree()).expect_err("refused").to_string();
+            assert!(message.contains(expected), "{message} should say {expected}");
+        }
+        assert!(ViewHierarchy::from_json("", &fork_tree()).is_err());
+    }
+
+    #[test]
+    fn front_view_has_the_patients_left_on_the_right() {
+        let front = View { towards_camera: DVec3::Y, up: DVec3::Z, ..sample().global };
+        assert_eq!(front.right(), DVec3::NEG_X);
+        assert_eq!(front.project(DVec3::new(-2.0, 7.0, 3.0)), DVec2::new(2.0, 3.0));
+    }
 }
