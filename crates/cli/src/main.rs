@@ -1,2 +1,39 @@
-//! To be written.
-fn main() {}
+//! `espalier`: a CT scan of a treelike organ, grown flat.
+//!
+//! **Architecture Invariant:** arguments, progress and exit codes; no logic. Only this crate prints: results to
+//! standard output, progress and errors to standard error.
+
+mod args;
+mod commands;
+mod progress;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use espalier_model::diagnose::Class;
+
+fn main() -> ExitCode {
+    turn_panics_into_exit_code_1();
+    let arguments = match args::Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // Help and version are results, not errors; clap knows which is which.
+            let _ = error.print();
+            return ExitCode::from(if error.use_stderr() { Class::Usage.exit_code() } else { 0 });
+        }
+    };
+    match commands::execute(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => commands::report_failure(&error),
+    }
+}
+
+/// A panic is a bug of ours: say so, and end with the code that the documentation gives for one.
+fn turn_panics_into_exit_code_1() {
+    let print_message = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        print_message(info);
+        progress::line("error: this is a bug in espalier; please report the lines above");
+        std::process::exit(i32::from(Class::Internal.exit_code()));
+    }));
+}

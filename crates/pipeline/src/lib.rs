@@ -1,1 +1,35 @@
-//! To be written.
+//! One config, every stage: the only place where stages meet.
+//!
+//! | step | module |
+//! |---|---|
+//! | a TOML file, its overrides, and exact places for what is wrong in it | [`config`] |
+//! | the stages, their order, what each reads and writes | [`stage`] |
+//! | hand-over data, from memory or from the run folder | `artifacts` |
+//! | what each stage does with them | `steps` |
+//! | the loop over the stages | [`run`](mod@run) |
+//! | the run folder: atomic files, digests, one lock | `folder` |
+//! | how a result came about | `provenance` |
+//!
+//! **Architecture Invariant:** a stage is handed what its predecessor *wrote*, as it would be read back: a run
+//! that starts in the middle gives the same bytes as one that starts at the beginning.
+//!
+//! **Architecture Invariant:** nothing is printed here; the caller is told by [`Event`]s.
+
+mod artifacts;
+mod clock;
+pub mod config;
+mod error;
+mod event;
+mod folder;
+mod phantom;
+mod provenance;
+pub mod run;
+pub mod stage;
+mod steps;
+
+pub use config::{Config, ConfigError, Loaded, Override};
+pub use error::Error;
+pub use event::Event;
+pub use phantom::make_phantom;
+pub use run::{Request, Summary, run};
+pub use stage::{Artifact, Stage};

@@ -1,0 +1,162 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+use espalier_pipeline::{Override, Stage};
+
+const EXAMPLES: &str = "\
+Examples:
+  espalier run pipelines/airway.toml                    the embedded phantom, from CT to picture
+  espalier run neuron.swc -o out/neuron                 a traced tree, every setting at its default
+  espalier run scan.nii.gz --set volume.method=region-grow \\
+      --set volume.upper=-865 --set 'volume.seed_voxel=[58,80,85]'
+  espalier run my.toml --from embed --set embed.w_angle=3    again from a stage on
+  espalier embed out/airway --set embed.freedom=s       one stage of a run folder
+  espalier skeleton mask.nii.gz -o out/skeleton         one stage on files
+  espalier phantom airway -o phantoms/airway            test data with its truth
+
+Exit codes:
+  0 done   1 a bug of ours   2 usage or config   3 input malformed or empty   5 over a stated limit
+  6 topology refused by policy   8 no certified layout, or an altered file   73 cannot create
+  74 missing or unreadable file, I/O   75 another run holds the folder";
+
+/// A CT scan of a treelike organ, airways or vessels, or a traced neuron, grown flat: one planar picture of
+/// every branch, without overlaps.
+#[derive(Debug, Parser)]
+#[command(version, after_help = EXAMPLES, max_term_width = 110)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+    #[command(flatten)]
+    pub(crate) common: Common,
+}
+
+/// Options of every command.
+#[derive(Debug, Args)]
+pub(crate) struct Common {
+    /// Change a config key, such as embed.w_angle=3; may be given many times
+    #[arg(long = "set", value_name = "KEY=VALUE", global = true, value_parser = parse_override)]
+    pub(crate) overrides: Vec<Override>,
+    /// Threads to use [default: one per core]; no result depends on it
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(crate) threads: Option<u16>,
+    /// The most memory that reading a file may take, such as 4G [default: half of the machine's]
+    #[arg(long, global = true, value_name = "SIZE", value_parser = parse_size)]
+    pub(crate) max_memory: Option<u64>,
+    /// Print results and errors only
+    #[arg(short, long, global = true)]
+    pub(crate) quiet: bool,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Run a whole pipeline: from a config, or from an input with every setting at its default
+    Run(RunArguments),
+    /// Make a phantom with its truth: CT, mask and tree
+    Phantom(PhantomArguments),
+    /// CT or label map -> mask:  espalier volume CT -o DIR
+    Volume(StageArguments),
+    /// Mask -> curve skeleton:  espalier skeleton MASK -o DIR
+    Skeleton(StageArguments),
+    /// Inscribed spheres:  espalier radius MASK SKELETON -o DIR
+    Radius(StageArguments),
+    /// One rooted tree:  espalier tree MASK SKELETON SPHERES -o DIR, or espalier tree TRACED.swc -o DIR
+    Tree(StageArguments),
+    /// Views and local planes:  espalier views TREE -o DIR
+    Views(StageArguments),
+    /// Planar embedding:  espalier embed TREE VIEWS -o DIR
+    Embed(StageArguments),
+    /// Pictures:  espalier render TREE VIEWS EMBEDDING -o DIR
+    Render(StageArguments),
+}
+
+/// `espalier run`.
+#[derive(Debug, Args)]
+pub(crate) struct RunArguments {
+    /// A config (.toml), or an input: .nii, .nii.gz, .swc
+    pub(crate) config_or_input: PathBuf,
+    /// The run folder [default: out/<name>]
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Begin at this stage, with what the earlier ones left in the run folder
+    #[arg(long, value_name = "STAGE", value_parser = parse_stage)]
+    pub(crate) from: Option<Stage>,
+    /// End after this stage
+    #[arg(long, value_name = "STAGE", value_parser = parse_stage)]
+    pub(crate) to: Option<Stage>,
+}
+
+/// `espalier phantom`.
+#[derive(Debug, Args)]
+pub(crate) struct PhantomArguments {
+    /// airway, vessel, neuron, straight, bent, helix, y, torus or comb
+    pub(crate) kind: String,
+    /// The folder for its files
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// The seed
+    #[arg(long, default_value_t = 0)]
+    pub(crate) seed: u64,
+}
+
+/// A stage on its own.
+#[derive(Debug, Args)]
+pub(crate) struct StageArguments {
+    /// A run folder, or the stage's input files in the order of its description
+    #[arg(required = true, value_name = "RUN|FILE")]
+    pub(crate) inputs: Vec<PathBuf>,
+    /// Where to write [default: the run folder itself]
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Take the settings from this config
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+}
+
+fn parse_override(text: &str) -> Result<Override, String> {
+    let (key, value) = text.split_once('=').ok_or("write KEY=VALUE, such as embed.w_angle=3")?;
+    Ok(Override { key: key.trim().to_owned(), value: value.trim().to_owned() })
+}
+
+fn parse_stage(text: &str) -> Result<Stage, String> {
+    Stage::from_name(text).ok_or_else(|| {
+        let names: Vec<&str> = Stage::ALL.iter().map(|stage| stage.name()).collect();
+        format!("there is no such stage; the stages are {}", names.join(", "))
+    })
+}
+
+/// A size in bytes, with K, M, G or T for powers of 1024.
+fn parse_size(text: &str) -> Result<u64, String> {
+    let complaint = || "write a size such as 800M or 4G".to_owned();
+    let (digits, shift) = match text.trim().to_ascii_uppercase().trim_end_matches('B') {
+        body if body.ends_with('K') => (body.trim_end_matches('K').to_owned(), 10),
+        body if body.ends_with('M') => (body.trim_end_matches('M').to_owned(), 20),
+        body if body.ends_with('G') => (body.trim_end_matches('G').to_owned(), 30),
+        body if body.ends_with('T') => (body.trim_end_matches('T').to_owned(), 40),
+        body => (body.to_owned(), 0),
+    };
+    let number: u64 = digits.parse().map_err(|_| complaint())?;
+    number.checked_mul(1 << shift).filter(|bytes| *bytes > 0).ok_or_else(complaint)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes() {
+        assert_eq!(parse_size("4G"), Ok(4 << 30));
+        assert_eq!(parse_size("800mb"), Ok(800 << 20));
+        assert_eq!(parse_size("17"), Ok(17));
+        assert!(parse_size("0").is_err() && parse_size("many").is_err() && parse_size("99999999999T").is_err());
+    }
+}

@@ -1,0 +1,153 @@
+//! What each command does.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::anyhow;
+use espalier_model::Diagnose;
+use espalier_model::diagnose::Class;
+use espalier_pipeline::{Artifact, Config, Error, Loaded, Override, Request, Stage, Summary};
+
+use crate::args::{Arguments, Command, PhantomArguments, RunArguments, StageArguments};
+use crate::progress::{self, Progress};
+
+/// Memory assumed where the machine does not tell its own.
+const FALLBACK_MEMORY_BYTES: u64 = 4 << 30;
+
+/// Does what the arguments say.
+pub(crate) fn execute(arguments: &Arguments) -> anyhow::Result<()> {
+    let summary = match &arguments.command {
+        Command::Run(run) => run_pipeline(arguments, run)?,
+        Command::Phantom(phantom) => make_phantom(arguments, phantom)?,
+        Command::Volume(stage) => run_stage(arguments, stage, Stage::Volume)?,
+        Command::Skeleton(stage) => run_stage(arguments, stage, Stage::Skeleton)?,
+        Command::Radius(stage) => run_stage(arguments, stage, Stage::Radius)?,
+        Command::Tree(stage) => run_stage(arguments, stage, Stage::Tree)?,
+        Command::Views(stage) => run_stage(arguments, stage, Stage::Views)?,
+        Command::Embed(stage) => run_stage(arguments, stage, Stage::Embed)?,
+        Command::Render(stage) => run_stage(arguments, stage, Stage::Render)?,
+    };
+    for file in &summary.highlights {
+        progress::result(&summary.out.join(file).display().to_string());
+    }
+    progress::result(&format!("digest {}", summary.digest));
+    Ok(())
+}
+
+/// Prints an error with its code and way out, and gives the exit code of its class.
+pub(crate) fn report_failure(error: &anyhow::Error) -> ExitCode {
+    let known = error.downcast_ref::<Error>();
+    let (code, class, hint) = known.map_or(("E-USAGE", Class::Usage, String::new()), |known| {
+        (known.code(), known.class(), known.hint())
+    });
+    progress::line(&format!("error[{code}]: {error}"));
+    if !hint.is_empty() {
+        progress::line(&format!("  hint: {hint}"));
+    }
+    ExitCode::from(class.exit_code())
+}
+
+fn run_pipeline(arguments: &Arguments, run: &RunArguments) -> anyhow::Result<Summary> {
+    let loaded = load(&run.config_or_input, &arguments.common.overrides)?;
+    let out = run.out.clone().unwrap_or_else(|| espalier_pipeline::run::default_folder(&loaded.config));
+    let request = Request { from: run.from, to: run.to, ..request(arguments, loaded, out) };
+    perform(arguments, &request)
+}
+
+fn make_phantom(arguments: &Arguments, phantom: &PhantomArguments) -> anyhow::Result<Summary> {
+    let mut overrides = vec![
+        Override { key: "input.phantom".to_owned(), value: phantom.kind.clone() },
+        Override { key: "seed".to_owned(), value: phantom.seed.to_string() },
+    ];
+    overrides.extend(arguments.common.overrides.iter().cloned());
+    let text = "schema = 1\n[input]\nphantom = \"airway\"\n";
+    let config = Config::parse(text, Path::new("command line"), &overrides).map_err(Error::from)?;
+    Ok(espalier_pipeline::make_phantom(&config, &phantom.out)?)
+}
+
+fn run_stage(arguments: &Arguments, stage: &StageArguments, which: Stage) -> anyhow::Result<Summary> {
+    let overrides = &arguments.common.overrides;
+    let run_config = stage.inputs[0].join("provenance/config.resolved.toml");
+    if stage.inputs[0].is_dir() && stage.inputs.len() == 1 {
+        let loaded = load(stage.config.as_ref().unwrap_or(&run_config), overrides)?;
+        let folder = &stage.inputs[0];
+        let out = stage.out.clone().unwrap_or_else(|| folder.clone());
+        let mut request = request(arguments, loaded, out);
+        if request.out != *folder {
+            request.files = which.reads().iter().map(|a| (*a, folder.join(a.file()))).collect();
+        }
+        return perform(arguments, &Request { from: Some(which), to: Some(which), ..request });
+    }
+    let files = stage_files(which, &stage.inputs)?;
+    let out = stage.out.clone().ok_or_else(|| anyhow!("{which} on files needs -o DIR"))?;
+    let mut loaded = match &stage.config {
+        Some(config) => load(config, overrides)?,
+        None => load_input(&stage.inputs[0], overrides)?,
+    };
+    loaded.config.input.path = Some(std::path::absolute(&stage.inputs[0])?.to_string_lossy().into_owned());
+    loaded.config.input.phantom = None;
+    let request = Request { files, from: Some(which), to: Some(which), ..request(arguments, loaded, out) };
+    perform(arguments, &request)
+}
+
+/// Which file is which artifact.
+fn stage_files(stage: Stage, inputs: &[PathBuf]) -> anyhow::Result<BTreeMap<Artifact, PathBuf>> {
+    let is_traced = stage == Stage::Tree && inputs.len() == 1;
+    let wanted = if is_traced { &[Artifact::Traced] } else { stage.reads() };
+    if wanted.len() != inputs.len() {
+        let names: Vec<&str> = wanted.iter().map(|artifact| artifact.what()).collect();
+        return Err(anyhow!("{stage} takes {} files ({}), not {}", wanted.len(), names.join(", "), inputs.len()));
+    }
+    Ok(wanted.iter().copied().zip(inputs.iter().cloned()).collect())
+}
+
+fn request(arguments: &Arguments, loaded: Loaded, out: PathBuf) -> Request {
+    Request {
+        loaded,
+        out,
+        from: None,
+        to: None,
+        files: BTreeMap::new(),
+        threads: arguments.common.threads.map(usize::from),
+        max_memory_bytes: arguments.common.max_memory.unwrap_or_else(half_of_memory),
+        data_dir: data_dir(),
+    }
+}
+
+fn perform(arguments: &Arguments, request: &Request) -> anyhow::Result<Summary> {
+    let progress = Progress::new(arguments.common.quiet);
+    Ok(espalier_pipeline::run(request, &|event| progress.show(event))?)
+}
+
+/// A config file, or an input with every setting at its default.
+fn load(path: &Path, overrides: &[Override]) -> anyhow::Result<Loaded> {
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| Error::Read { path: path.to_owned(), source })?;
+        let config = Config::parse(&text, path, overrides).map_err(Error::from)?;
+        let base_dir = path.parent().unwrap_or(Path::new("")).to_owned();
+        return Ok(Loaded { config, base_dir });
+    }
+    load_input(path, overrides)
+}
+
+fn load_input(path: &Path, overrides: &[Override]) -> anyhow::Result<Loaded> {
+    let config = Config::for_input(path, overrides).map_err(Error::from)?;
+    Ok(Loaded { config, base_dir: PathBuf::new() })
+}
+
+#[allow(clippy::disallowed_methods, reason = "the command line is where the environment is read")]
+fn data_dir() -> Option<PathBuf> {
+    std::env::var_os("ESPALIER_DATA").map(PathBuf::from)
+}
+
+/// Half of the machine's memory.
+fn half_of_memory() -> u64 {
+    let total = || -> Option<u64> {
+        let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+        let kilobytes = text.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
+        kilobytes.split_whitespace().next()?.parse::<u64>().ok().map(|kb| kb * 1024)
+    };
+    total().map_or(FALLBACK_MEMORY_BYTES, |bytes| bytes / 2)
+}

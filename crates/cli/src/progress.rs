@@ -1,0 +1,74 @@
+//! Progress on standard error: a bar on a terminal, one line a stage everywhere.
+
+use std::io::{IsTerminal, Write};
+use std::sync::Mutex;
+
+use espalier_pipeline::Event;
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Prints a line to standard error. A closed standard error is no reason to stop.
+pub(crate) fn line(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
+
+/// Prints a line to standard output. A closed standard output (`| head`) is no reason to stop.
+pub(crate) fn result(text: &str) {
+    let _ = writeln!(std::io::stdout(), "{text}");
+}
+
+/// Shows the events of a run.
+pub(crate) struct Progress {
+    is_quiet: bool,
+    is_terminal: bool,
+    bar: Mutex<Option<ProgressBar>>,
+}
+
+impl Progress {
+    pub(crate) fn new(is_quiet: bool) -> Self {
+        Self { is_quiet, is_terminal: std::io::stderr().is_terminal(), bar: Mutex::new(None) }
+    }
+
+    pub(crate) fn show(&self, event: Event) {
+        if self.is_quiet {
+            return;
+        }
+        // A panic while the lock was held ends the process, so the lock is never poisoned for anyone.
+        let Ok(mut bar) = self.bar.lock() else { return };
+        match event {
+            Event::Started { stage } if self.is_terminal => {
+                let spinner = ProgressBar::new_spinner().with_message(stage.name());
+                spinner.enable_steady_tick(std::time::Duration::from_millis(100));
+                *bar = Some(spinner);
+            }
+            Event::Progress { stage, done, total, note } => {
+                if let Some(bar) = bar.as_ref() {
+                    if bar.length() != Some(total) {
+                        bar.set_style(bar_style());
+                        bar.set_length(total);
+                    }
+                    bar.set_position(done);
+                    bar.set_message(format!("{stage}  {note}"));
+                }
+            }
+            Event::Warning { stage, code, message } => {
+                finish(&mut bar);
+                line(&format!("{stage:<9} warning[{code}]: {message}"));
+            }
+            Event::Finished { stage, seconds, line: text } => {
+                finish(&mut bar);
+                line(&format!("{stage:<9}{seconds:>6.1} s  {text}"));
+            }
+            _ => {}
+        }
+    }
+}
+
+fn finish(bar: &mut Option<ProgressBar>) {
+    if let Some(bar) = bar.take() {
+        bar.finish_and_clear();
+    }
+}
+
+fn bar_style() -> ProgressStyle {
+    ProgressStyle::with_template("{wide_bar} {percent:>3} %  {msg}").unwrap_or_else(|_| ProgressStyle::default_bar())
+}

@@ -1,0 +1,163 @@
+//! Hand-over data: from memory where a stage of this run has just made it, else from its file.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use espalier_model::swc::{self, SwcScale, Traced};
+use espalier_model::{
+    Diagnose, Embedding, InscribedSpheres, Mask, Report, Skeleton, Tree, ViewHierarchy, Volume,
+};
+
+use crate::error::Error;
+use crate::folder::RunFolder;
+use crate::stage::{Artifact, Stage};
+
+/// The hand-over data of a run.
+#[derive(Default)]
+pub(crate) struct Artifacts {
+    /// Files named by the user, instead of those in the run folder.
+    pub(crate) files: BTreeMap<Artifact, PathBuf>,
+    pub(crate) read_options: espalier_volume::ReadOptions,
+    pub(crate) traced_scale: Option<SwcScale>,
+    pub(crate) volume: Option<Arc<Volume>>,
+    pub(crate) traced: Option<Arc<Traced>>,
+    pub(crate) mask: Option<Arc<Mask>>,
+    pub(crate) skeleton: Option<Arc<Skeleton>>,
+    pub(crate) spheres: Option<Arc<InscribedSpheres>>,
+    pub(crate) tree: Option<Arc<Tree>>,
+    pub(crate) views: Option<Arc<ViewHierarchy>>,
+    pub(crate) embedding: Option<Arc<Embedding>>,
+}
+
+/// Where an artifact is looked for, and for whom.
+#[derive(Clone, Copy)]
+pub(crate) struct Lookup<'a> {
+    pub(crate) folder: &'a RunFolder,
+    pub(crate) stage: Stage,
+}
+
+impl Artifacts {
+    /// The scan, with what its reader had to say.
+    pub(crate) fn volume(&mut self, lookup: Lookup<'_>) -> Result<(Arc<Volume>, Report), Error> {
+        if let Some(volume) = &self.volume {
+            return Ok((Arc::clone(volume), Report::default()));
+        }
+        let path = self.locate(Artifact::Volume, lookup)?;
+        let loaded = self.read_volume(&path)?;
+        let volume = Arc::new(loaded.volume);
+        self.volume = Some(Arc::clone(&volume));
+        Ok((volume, loaded.report))
+    }
+
+    /// The traced tree, with what its reader had to say.
+    pub(crate) fn traced(&mut self, lookup: Lookup<'_>) -> Result<(Arc<Traced>, Report), Error> {
+        if let Some(traced) = &self.traced {
+            return Ok((Arc::clone(traced), Report::default()));
+        }
+        let path = self.locate(Artifact::Traced, lookup)?;
+        let bytes = fs::read(&path).map_err(|source| Error::Read { path: path.clone(), source })?;
+        let scale = self.traced_scale.unwrap_or_else(SwcScale::millimetres);
+        let (traced, report) = swc::parse(&bytes, &scale).map_err(|error| Error::file(&path, error))?;
+        let traced = Arc::new(traced);
+        self.traced = Some(Arc::clone(&traced));
+        Ok((traced, report))
+    }
+
+    pub(crate) fn mask(&mut self, lookup: Lookup<'_>) -> Result<Arc<Mask>, Error> {
+        if let Some(mask) = &self.mask {
+            return Ok(Arc::clone(mask));
+        }
+        let path = self.locate(Artifact::Mask, lookup)?;
+        let volume = self.read_volume(&path)?.volume;
+        let mask = Arc::new(Mask::new(volume.grid().clone(), volume.map_values(|value| value != 0.0)));
+        self.mask = Some(Arc::clone(&mask));
+        Ok(mask)
+    }
+
+    pub(crate) fn skeleton(&mut self, lookup: Lookup<'_>) -> Result<Arc<Skeleton>, Error> {
+        if let Some(skeleton) = &self.skeleton {
+            return Ok(Arc::clone(skeleton));
+        }
+        let path = self.locate(Artifact::Skeleton, lookup)?;
+        let volume = self.read_volume(&path)?.volume;
+        let grid = volume.grid();
+        let mut voxels = Vec::new();
+        let mut index = 0;
+        volume.for_each_value(|value| {
+            if value != 0.0 {
+                // An extent read from a NIfTI-1 file fits 16 bits.
+                voxels.push(grid.voxel(index).map(|coordinate| coordinate as u32));
+            }
+            index += 1;
+        });
+        let skeleton = Arc::new(Skeleton::new(grid.clone(), voxels));
+        self.skeleton = Some(Arc::clone(&skeleton));
+        Ok(skeleton)
+    }
+
+    pub(crate) fn spheres(&mut self, lookup: Lookup<'_>) -> Result<Arc<InscribedSpheres>, Error> {
+        let spheres = self.spheres.clone();
+        let spheres = self.parsed(spheres, Artifact::Spheres, lookup, |text| InscribedSpheres::from_tsv(text))?;
+        self.spheres = Some(Arc::clone(&spheres));
+        Ok(spheres)
+    }
+
+    pub(crate) fn tree(&mut self, lookup: Lookup<'_>) -> Result<Arc<Tree>, Error> {
+        let tree = self.tree.clone();
+        let tree = self.parsed(tree, Artifact::Tree, lookup, |text| swc::read_tree(text.as_bytes()))?;
+        self.tree = Some(Arc::clone(&tree));
+        Ok(tree)
+    }
+
+    pub(crate) fn views(&mut self, lookup: Lookup<'_>) -> Result<Arc<ViewHierarchy>, Error> {
+        let tree = self.tree(lookup)?;
+        let views = self.views.clone();
+        let views = self.parsed(views, Artifact::Views, lookup, |text| ViewHierarchy::from_json(text, &tree))?;
+        self.views = Some(Arc::clone(&views));
+        Ok(views)
+    }
+
+    pub(crate) fn embedding(&mut self, lookup: Lookup<'_>) -> Result<Arc<Embedding>, Error> {
+        let tree = self.tree(lookup)?;
+        let embedding = self.embedding.clone();
+        let embedding =
+            self.parsed(embedding, Artifact::Embedding, lookup, |text| Embedding::from_json(text, &tree))?;
+        self.embedding = Some(Arc::clone(&embedding));
+        Ok(embedding)
+    }
+
+    /// What memory has, else what `parse` makes of the artifact's file.
+    fn parsed<T, E: Diagnose + Send + Sync + 'static>(
+        &self,
+        in_memory: Option<Arc<T>>,
+        artifact: Artifact,
+        lookup: Lookup<'_>,
+        parse: impl FnOnce(&str) -> Result<T, E>,
+    ) -> Result<Arc<T>, Error> {
+        if let Some(known) = in_memory {
+            return Ok(known);
+        }
+        let path = self.locate(artifact, lookup)?;
+        let text = fs::read_to_string(&path).map_err(|source| Error::Read { path: path.clone(), source })?;
+        parse(&text).map(Arc::new).map_err(|error| Error::file(&path, error))
+    }
+
+    fn read_volume(&self, path: &Path) -> Result<espalier_volume::Loaded, Error> {
+        espalier_volume::read(path, &self.read_options).map_err(|error| Error::file(path, error))
+    }
+
+    /// The file of an artifact: the one that the user named, else that of the run folder, checked.
+    fn locate(&self, artifact: Artifact, lookup: Lookup<'_>) -> Result<PathBuf, Error> {
+        if let Some(path) = self.files.get(&artifact) {
+            return Ok(path.clone());
+        }
+        let path = lookup.folder.path().join(artifact.file());
+        if !path.exists() {
+            return Err(Error::MissingArtifact { stage: lookup.stage, artifact, path });
+        }
+        lookup.folder.read(artifact.file())?;
+        Ok(path)
+    }
+}

@@ -1,0 +1,167 @@
+//! `[input]`: where a run begins.
+
+use std::path::{Path, PathBuf};
+
+use espalier_model::diagnose::ParamError;
+use espalier_model::swc::SwcScale;
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// The variable that may begin a path, for data that lies elsewhere on every machine.
+const DATA_VARIABLE: &str = "$ESPALIER_DATA";
+
+/// What kind of thing the input is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum InputKind {
+    /// By its name: `.swc` is a tree, all else a volume.
+    #[default]
+    Auto,
+    /// A volume: CT, label map or mask; `[volume]` says how it becomes a mask.
+    Volume,
+    /// A traced tree.
+    Tree,
+}
+
+/// A unit of length.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Unit {
+    /// µm for SWC.
+    #[default]
+    Auto,
+    /// Millimetres.
+    Mm,
+    /// Micrometres.
+    Um,
+    /// Nanometres.
+    Nm,
+}
+
+impl Unit {
+    /// Its length in mm.
+    #[must_use]
+    pub fn mm(self) -> f64 {
+        match self {
+            Self::Mm => 1.0,
+            Self::Auto | Self::Um => 1e-3,
+            Self::Nm => 1e-6,
+        }
+    }
+}
+
+/// Where a run begins: a file or a phantom.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Input {
+    /// A volume (`.nii`, `.nii.gz`) or a traced tree (`.swc`). Relative to the config's folder;
+    /// `$ESPALIER_DATA` at its beginning is expanded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub path: Option<String>,
+    /// Instead of a file: the phantom to make; `[phantom]` has its shape.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub phantom: Option<espalier_phantom::Kind>,
+    /// What the file is. Default `auto`: by its name.
+    pub kind: InputKind,
+    /// Which volume of a 4D file, from 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub volume_index: Option<usize>,
+    /// What to make of a volume whose header does not say where it lies.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub assume_space: Option<espalier_volume::AssumeSpace>,
+    /// Refuse what would otherwise be repaired with a warning. Default false.
+    pub strict: bool,
+    /// The unit of a traced tree. Default `auto`: µm.
+    pub unit: Unit,
+    /// How many units a step in x, y, z of a traced tree is. Default 1, 1, 1; for files in pixels and slices.
+    pub scale: [f64; 3],
+    /// How many units a step in a traced tree's radius is. Default 1.
+    pub radius_scale: f64,
+}
+
+impl Default for Input {
+    fn default() -> Self {
+        Self {
+            path: None,
+            phantom: None,
+            kind: InputKind::Auto,
+            volume_index: None,
+            assume_space: None,
+            strict: false,
+            unit: Unit::Auto,
+            scale: [1.0; 3],
+            radius_scale: 1.0,
+        }
+    }
+}
+
+/// The input, resolved.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Source {
+    /// A volume file.
+    Volume(PathBuf),
+    /// A traced tree file.
+    Tree(PathBuf),
+    /// A phantom with a scan.
+    PhantomScan(espalier_phantom::Kind),
+    /// A phantom that is traced at once.
+    PhantomTree(espalier_phantom::Kind),
+}
+
+impl Input {
+    /// Checks the keys against each other.
+    ///
+    /// # Errors
+    /// [`ParamError`] with the key and what is legal.
+    pub fn validate(&self) -> Result<(), ParamError> {
+        let has_path = self.path.as_ref().is_some_and(|path| !path.is_empty());
+        ParamError::check(
+            "path",
+            has_path || self.phantom.is_some(),
+            "a run needs an input: set path to a file, or phantom = \"airway\" | \"vessel\" | \"neuron\"",
+        )?;
+        ParamError::check("path", !(has_path && self.phantom.is_some()), "set path or phantom, not both")?;
+        let is_scale = |scale: f64| scale.is_finite() && (1e-9..=1e9).contains(&scale);
+        ParamError::check("scale", self.scale.into_iter().all(is_scale), "must be three numbers in 1e-9..=1e9")?;
+        ParamError::check(
+            "radius_scale",
+            is_scale(self.radius_scale),
+            format!("must be in 1e-9..=1e9, is {}", self.radius_scale),
+        )
+    }
+
+    /// How many mm a step in a traced tree's coordinates and radii is.
+    #[must_use]
+    pub fn traced_scale(&self) -> SwcScale {
+        let unit_mm = self.unit.mm();
+        SwcScale { position_mm: DVec3::from_array(self.scale) * unit_mm, radius_mm: self.radius_scale * unit_mm }
+    }
+
+    /// The input's place, for a config in `base_dir` and data in `data_dir`.
+    ///
+    /// # Errors
+    /// [`ParamError`] if the path begins with `$ESPALIER_DATA` and there is no `data_dir`.
+    pub fn resolve(&self, base_dir: &Path, data_dir: Option<&Path>) -> Result<Source, ParamError> {
+        if let Some(kind) = self.phantom {
+            let is_tree = kind == espalier_phantom::Kind::Neuron || self.kind == InputKind::Tree;
+            return Ok(if is_tree { Source::PhantomTree(kind) } else { Source::PhantomScan(kind) });
+        }
+        let written = self.path.as_deref().unwrap_or_default();
+        let path = match written.strip_prefix(DATA_VARIABLE) {
+            Some(rest) => {
+                let data_dir = data_dir.ok_or_else(|| ParamError {
+                    key: "path",
+                    message: format!("{written}: the variable ESPALIER_DATA is not set"),
+                })?;
+                data_dir.join(rest.trim_start_matches('/'))
+            }
+            None => base_dir.join(written),
+        };
+        let is_swc = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("swc"));
+        Ok(match self.kind {
+            InputKind::Tree => Source::Tree(path),
+            InputKind::Auto if is_swc => Source::Tree(path),
+            InputKind::Auto | InputKind::Volume => Source::Volume(path),
+        })
+    }
+}

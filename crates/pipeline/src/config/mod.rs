@@ -1,0 +1,177 @@
+//! The config: one TOML file is the whole run.
+//!
+//! **Steps** 1. Parse the text; an unknown key or a wrong type is an error at its line. 2. Lay `--set key=value`
+//! overrides over it. 3. Validate every stage's parameters; a value out of range is an error at its line.
+//! 4. [`Config::to_toml`] writes the resolved copy, every key with its value.
+
+mod input;
+mod place;
+
+use std::path::{Path, PathBuf};
+
+use espalier_model::diagnose::{Class, Diagnose, ParamError};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+pub use input::{Input, InputKind, Source, Unit};
+
+use crate::stage::Stage;
+
+/// The version of the config's schema.
+pub const SCHEMA: u32 = 1;
+
+/// A whole run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// The version of the schema; 1.
+    pub schema: u32,
+    /// The name of the run: its folder is `out/<name>`, its title that of the picture.
+    pub name: String,
+    /// The seed of everything random in the run. Default 0; always saved.
+    pub seed: u64,
+    /// Where the run begins.
+    pub input: Input,
+    /// `[phantom]`: the shape and the scan of a phantom.
+    pub phantom: espalier_phantom::Params,
+    /// `[volume]`: scan → mask.
+    pub volume: espalier_volume::Params,
+    /// `[skeleton]`: mask → curve skeleton.
+    pub skeleton: espalier_skeleton::Params,
+    /// `[radius]`: inscribed spheres.
+    pub radius: espalier_radius::Params,
+    /// `[tree]`: one rooted tree.
+    pub tree: espalier_tree::Params,
+    /// `[views]`: views and local planes.
+    pub views: espalier_views::Params,
+    /// `[embed]`: the planar embedding.
+    pub embed: espalier_embed::Params,
+    /// `[render]`: pictures.
+    pub render: espalier_render::Params,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            schema: SCHEMA,
+            name: "run".to_owned(),
+            seed: 0,
+            input: Input::default(),
+            phantom: espalier_phantom::Params::default(),
+            volume: espalier_volume::Params::default(),
+            skeleton: espalier_skeleton::Params::default(),
+            radius: espalier_radius::Params::default(),
+            tree: espalier_tree::Params::default(),
+            views: espalier_views::Params::default(),
+            embed: espalier_embed::Params::default(),
+            render: espalier_render::Params::default(),
+        }
+    }
+}
+
+/// A config and the folder that its relative paths start from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loaded {
+    /// The config.
+    pub config: Config,
+    /// Relative paths in it start here.
+    pub base_dir: PathBuf,
+}
+
+/// Why a config cannot be used, at which place.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{rendered}")]
+pub struct ConfigError {
+    rendered: String,
+    hint: String,
+}
+
+impl Diagnose for ConfigError {
+    fn code(&self) -> &'static str {
+        "E-CONFIG"
+    }
+
+    fn class(&self) -> Class {
+        Class::Usage
+    }
+
+    fn hint(&self) -> String {
+        self.hint.clone()
+    }
+}
+
+/// A `--set key=value` from the command line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Override {
+    /// The dotted key, such as `embed.w_angle`.
+    pub key: String,
+    /// The value as TOML; what is not TOML is taken as a string.
+    pub value: String,
+}
+
+impl Config {
+    /// The config in `text`, read from `path`, under `overrides`.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with the line, a picture of the place, and the nearest legal key or the legal range.
+    pub fn parse(text: &str, path: &Path, overrides: &[Override]) -> Result<Self, Box<ConfigError>> {
+        let source = place::SourceText { text, path };
+        // The file alone comes first: only there do errors have a place.
+        let alone: Self = toml::from_str(text).map_err(|error| source.parse_error(&error))?;
+        let config = if overrides.is_empty() { alone } else { source.overridden(overrides)? };
+        config.validate(&source)?;
+        Ok(config)
+    }
+
+    /// The config of a run that is given only its input, under `overrides`.
+    ///
+    /// # Errors
+    /// As [`Config::parse`].
+    pub fn for_input(input: &Path, overrides: &[Override]) -> Result<Self, Box<ConfigError>> {
+        let path = input.to_string_lossy();
+        let file_name = input.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = file_name.split('.').next().filter(|stem| !stem.is_empty()).unwrap_or("run");
+        let text = format!(
+            "schema = {SCHEMA}\nname = {}\n[input]\npath = {}\n",
+            toml::Value::from(name),
+            toml::Value::from(path.as_ref())
+        );
+        Self::parse(&text, Path::new("command line"), overrides)
+    }
+
+    /// The config with every key, as TOML.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        // Plain structs of numbers, strings, enums and tables: serialisation cannot fail.
+        toml::to_string(self).unwrap_or_default()
+    }
+
+    fn validate(&self, source: &place::SourceText<'_>) -> Result<(), Box<ConfigError>> {
+        let at = |table: Option<Stage>| {
+            move |error: ParamError| source.value_error(table.map_or("", Stage::name), &error)
+        };
+        ParamError::check("schema", self.schema == SCHEMA, format!("must be {SCHEMA}, is {}", self.schema))
+            .map_err(at(None))?;
+        ParamError::check("name", is_folder_name(&self.name), "must be letters, digits, '-', '_' or '.'")
+            .map_err(at(None))?;
+        ParamError::check("seed", i64::try_from(self.seed).is_ok(), "must be below 2^63, the largest TOML integer")
+            .map_err(at(None))?;
+        self.input.validate().map_err(|error| source.value_error("input", &error))?;
+        self.phantom.validate().map_err(at(Some(Stage::Phantom)))?;
+        self.volume.validate().map_err(at(Some(Stage::Volume)))?;
+        self.skeleton.validate().map_err(at(Some(Stage::Skeleton)))?;
+        self.radius.validate().map_err(at(Some(Stage::Radius)))?;
+        self.tree.validate().map_err(at(Some(Stage::Tree)))?;
+        self.views.validate().map_err(at(Some(Stage::Views)))?;
+        self.embed.validate().map_err(at(Some(Stage::Embed)))?;
+        self.render.validate().map_err(at(Some(Stage::Render)))
+    }
+}
+
+/// Whether a name can be a folder of its own anywhere, with no way out of its parent.
+fn is_folder_name(name: &str) -> bool {
+    !name.is_empty()
+        && name.len() <= 100
+        && !name.starts_with('.')
+        && name.chars().all(|c| c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | ' '))
+}

@@ -1,0 +1,168 @@
+//! What can go wrong in a run.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use espalier_model::diagnose::{Class, Diagnose};
+use thiserror::Error;
+
+use crate::config::ConfigError;
+use crate::stage::{Artifact, Stage};
+
+/// Why a run stopped.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The config is wrong.
+    #[error(transparent)]
+    Config(#[from] Box<ConfigError>),
+    /// A stage refused its input or its parameters.
+    #[error("{stage}: {source}")]
+    Stage {
+        /// The stage.
+        stage: Stage,
+        /// What it said.
+        source: Box<dyn Diagnose + Send + Sync>,
+    },
+    /// A stage file cannot be used.
+    #[error("{path}: {source}", path = path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: Box<dyn Diagnose + Send + Sync>,
+    },
+    /// A stage needs a file that is not there.
+    #[error("{stage} needs the {what}, but there is no {path}", what = artifact.what(), path = path.display())]
+    MissingArtifact {
+        /// The stage.
+        stage: Stage,
+        /// What it needs.
+        artifact: Artifact,
+        /// Where it was looked for.
+        path: PathBuf,
+    },
+    /// A stage file is not the one that the run wrote.
+    #[error("{path} is not what this run folder's SHA256SUMS says", path = path.display())]
+    Altered {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A stage that this input does not pass through was asked for.
+    #[error("--{flag} {stage}: a run from this input has no such stage; it has {available}")]
+    NoSuchStage {
+        /// `from` or `to`.
+        flag: &'static str,
+        /// The stage asked for.
+        stage: Stage,
+        /// The stages there are.
+        available: String,
+    },
+    /// `--from` lies behind `--to`.
+    #[error("--from {from} comes after --to {to}")]
+    EmptyRange {
+        /// First stage asked for.
+        from: Stage,
+        /// Last stage asked for.
+        to: Stage,
+    },
+    /// Reading failed.
+    #[error("cannot read {path}: {source}", path = path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// An output cannot be created.
+    #[error("cannot create {path}: {source}", path = path.display())]
+    Create {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Writing failed.
+    #[error("cannot write {path}: {source}", path = path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Another run holds the folder.
+    #[error("another run is at work in {folder}", folder = folder.display())]
+    Locked {
+        /// The run folder.
+        folder: PathBuf,
+    },
+    /// The threads cannot be started.
+    #[error("cannot start {threads} threads: {message}")]
+    Threads {
+        /// How many.
+        threads: usize,
+        /// What the pool said.
+        message: String,
+    },
+}
+
+impl Error {
+    pub(crate) fn stage(stage: Stage) -> impl Fn(Box<dyn Diagnose + Send + Sync>) -> Self {
+        move |source| Self::Stage { stage, source }
+    }
+
+    pub(crate) fn file(path: &Path, source: impl Diagnose + Send + Sync + 'static) -> Self {
+        Self::File { path: path.to_owned(), source: Box::new(source) }
+    }
+}
+
+impl Diagnose for Error {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::Config(error) => error.code(),
+            Self::Stage { source, .. } | Self::File { source, .. } => source.code(),
+            Self::MissingArtifact { .. } => "E-RUN-MISSING-FILE",
+            Self::Altered { .. } => "E-RUN-ALTERED-FILE",
+            Self::NoSuchStage { .. } | Self::EmptyRange { .. } => "E-RUN-STAGES",
+            Self::Read { .. } => "E-IO-READ",
+            Self::Create { .. } => "E-IO-CREATE",
+            Self::Write { .. } => "E-IO-WRITE",
+            Self::Locked { .. } => "E-RUN-LOCKED",
+            Self::Threads { .. } => "E-RUN-THREADS",
+        }
+    }
+
+    fn class(&self) -> Class {
+        match self {
+            Self::Config(error) => error.class(),
+            Self::Stage { source, .. } | Self::File { source, .. } => source.class(),
+            Self::NoSuchStage { .. } | Self::EmptyRange { .. } | Self::Threads { .. } => Class::Usage,
+            Self::MissingArtifact { .. } | Self::Read { .. } | Self::Write { .. } => Class::Io,
+            Self::Altered { .. } => Class::Uncertified,
+            Self::Create { .. } => Class::CannotCreate,
+            Self::Locked { .. } => Class::Locked,
+        }
+    }
+
+    fn hint(&self) -> String {
+        match self {
+            Self::Config(error) => error.hint(),
+            Self::Stage { source, .. } | Self::File { source, .. } => source.hint(),
+            Self::MissingArtifact { .. } => "start from an earlier stage with --from, or name the file".to_owned(),
+            Self::Altered { .. } => {
+                "run the stage that makes it again; or, if the edit is meant, give the file to the stage's own \
+                 command with -o to another folder"
+                    .to_owned()
+            }
+            Self::Read { source, .. } if source.kind() == io::ErrorKind::NotFound => {
+                "check the path; a path in a config is relative to the config's own folder".to_owned()
+            }
+            Self::Create { .. } => "choose another folder with -o".to_owned(),
+            Self::Write { .. } => "check the free space and the permissions of the folder".to_owned(),
+            Self::Locked { .. } => "wait for it, or choose another folder with -o".to_owned(),
+            Self::NoSuchStage { .. } | Self::EmptyRange { .. } | Self::Read { .. } | Self::Threads { .. } => {
+                String::new()
+            }
+        }
+    }
+}

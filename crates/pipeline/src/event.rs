@@ -1,0 +1,43 @@
+//! What a run tells its caller while it goes on.
+
+use crate::stage::Stage;
+
+/// Something that happened in a run.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Event {
+    /// A stage begins.
+    Started {
+        /// The stage.
+        stage: Stage,
+    },
+    /// A stage goes on.
+    Progress {
+        /// The stage.
+        stage: Stage,
+        /// Work done.
+        done: u64,
+        /// All work.
+        total: u64,
+        /// The state so far, as a phrase.
+        note: String,
+    },
+    /// A stage has something to say that did not stop it.
+    Warning {
+        /// The stage.
+        stage: Stage,
+        /// Its code.
+        code: &'static str,
+        /// The place and the fact.
+        message: String,
+    },
+    /// A stage is done and its files are in place.
+    Finished {
+        /// The stage.
+        stage: Stage,
+        /// How long it took.
+        seconds: f64,
+        /// What it did, as a phrase.
+        line: String,
+    },
+}

@@ -1,0 +1,122 @@
+//! The run folder: atomic files, digests, one lock.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File, TryLockError};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use atomic_write_file::AtomicWriteFile;
+use sha2::{Digest, Sha256};
+
+use crate::error::Error;
+
+const DIGEST_FILE: &str = "SHA256SUMS";
+const LOCK_FILE: &str = ".lock";
+
+/// A run folder, held by this process alone while the value lives.
+pub(crate) struct RunFolder {
+    path: PathBuf,
+    /// What `SHA256SUMS` says, by file.
+    digests: BTreeMap<String, String>,
+    /// What it said when the folder was opened.
+    former_digests: BTreeMap<String, String>,
+    /// The system releases the lock with the handle, however the process ends.
+    _lock: File,
+}
+
+impl RunFolder {
+    /// Opens or makes the folder and takes its lock.
+    pub(crate) fn open(path: &Path) -> Result<Self, Error> {
+        let create = |source| Error::Create { path: path.to_owned(), source };
+        fs::create_dir_all(path).map_err(create)?;
+        let lock = File::create(path.join(LOCK_FILE)).map_err(create)?;
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(Error::Locked { folder: path.to_owned() }),
+            // A file system without locks (some network mounts) still serves a single run.
+            Err(TryLockError::Error(source)) if source.kind() == io::ErrorKind::Unsupported => {}
+            Err(TryLockError::Error(source)) => return Err(create(source)),
+        }
+        let digests = read_digests(&path.join(DIGEST_FILE));
+        Ok(Self { path: path.to_owned(), former_digests: digests.clone(), digests, _lock: lock })
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes a result file, whole or not at all; tells whether it differs from what the folder had.
+    pub(crate) fn write(&mut self, relative: &str, bytes: &[u8]) -> Result<bool, Error> {
+        self.write_aside(relative, bytes)?;
+        let digest = hex_digest(bytes);
+        let is_new = self.former_digests.get(relative) != Some(&digest);
+        self.digests.insert(relative.to_owned(), digest);
+        Ok(is_new)
+    }
+
+    /// Takes the digests of files that are about to be written out of `SHA256SUMS`.
+    pub(crate) fn forget(&mut self, files: &[String]) -> Result<(), Error> {
+        let n_known = self.digests.len();
+        self.digests.retain(|file, _| !files.contains(file));
+        if self.digests.len() < n_known { self.seal().map(|_| ()) } else { Ok(()) }
+    }
+
+    /// Writes a file that is not a result (a log, a time), whole or not at all.
+    pub(crate) fn write_aside(&self, relative: &str, bytes: &[u8]) -> Result<(), Error> {
+        let path = self.path.join(relative);
+        let parent = path.parent().unwrap_or(&self.path);
+        fs::create_dir_all(parent).map_err(|source| Error::Create { path: parent.to_owned(), source })?;
+        let write = |source| Error::Write { path: path.clone(), source };
+        let mut file = AtomicWriteFile::open(&path).map_err(|source| Error::Create { path: path.clone(), source })?;
+        file.write_all(bytes).map_err(write)?;
+        file.commit().map_err(write)
+    }
+
+    /// Removes a result file that no longer follows from the others.
+    pub(crate) fn remove(&mut self, relative: &str) -> Result<(), Error> {
+        self.digests.remove(relative);
+        let path = self.path.join(relative);
+        match fs::remove_file(&path) {
+            Err(source) if source.kind() != io::ErrorKind::NotFound => Err(Error::Write { path, source }),
+            _ => Ok(()),
+        }
+    }
+
+    /// The bytes of a result file, checked against its digest if the folder has one.
+    pub(crate) fn read(&self, relative: &str) -> Result<Vec<u8>, Error> {
+        let path = self.path.join(relative);
+        let bytes = fs::read(&path).map_err(|source| Error::Read { path: path.clone(), source })?;
+        self.check(relative, &bytes).map(|()| bytes)
+    }
+
+    /// Checks bytes against the digest that the folder has for them, if any.
+    pub(crate) fn check(&self, relative: &str, bytes: &[u8]) -> Result<(), Error> {
+        match self.digests.get(relative) {
+            Some(digest) if *digest != hex_digest(bytes) => {
+                Err(Error::Altered { path: self.path.join(relative) })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Writes `SHA256SUMS` (the format of `sha256sum -c`) and gives its own digest.
+    pub(crate) fn seal(&self) -> Result<String, Error> {
+        let text: String = self.digests.iter().map(|(file, digest)| format!("{digest}  {file}\n")).collect();
+        self.write_aside(DIGEST_FILE, text.as_bytes())?;
+        Ok(hex_digest(text.as_bytes()))
+    }
+}
+
+/// The digests of an earlier run; none if the file is missing or not ours, since then nothing can be checked.
+fn read_digests(path: &Path) -> BTreeMap<String, String> {
+    let text = fs::read_to_string(path).unwrap_or_default();
+    text.lines()
+        .filter_map(|line| line.split_once("  "))
+        .map(|(digest, file)| (file.to_owned(), digest.to_owned()))
+        .collect()
+}
+
+/// The SHA-256 of some bytes, in hexadecimal digits.
+pub(crate) fn hex_digest(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}

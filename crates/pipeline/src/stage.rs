@@ -1,0 +1,185 @@
+//! The stages, their order, and the files between them.
+
+use std::fmt;
+
+/// A stage of the pipeline. The order is the order of the data flow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// Make a phantom: a CT, or a traced tree.
+    Phantom,
+    /// CT or label map → mask.
+    Volume,
+    /// Mask → curve skeleton voxels.
+    Skeleton,
+    /// Inscribed sphere at each skeleton voxel.
+    Radius,
+    /// Skeleton and spheres, or a traced tree → one rooted tree.
+    Tree,
+    /// Tree → views and local planes.
+    Views,
+    /// Tree and views → planar embedding.
+    Embed,
+    /// Embedding → pictures.
+    Render,
+}
+
+/// A piece of hand-over data that has a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Artifact {
+    /// A CT or label volume.
+    Volume,
+    /// A traced tree.
+    Traced,
+    /// A mask.
+    Mask,
+    /// Curve skeleton voxels.
+    Skeleton,
+    /// Inscribed spheres.
+    Spheres,
+    /// A rooted tree.
+    Tree,
+    /// Views and local planes.
+    Views,
+    /// A planar embedding.
+    Embedding,
+}
+
+impl Stage {
+    /// All stages in order.
+    pub const ALL: [Self; 8] = [
+        Self::Phantom,
+        Self::Volume,
+        Self::Skeleton,
+        Self::Radius,
+        Self::Tree,
+        Self::Views,
+        Self::Embed,
+        Self::Render,
+    ];
+
+    /// The name in configs, commands and folders.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Phantom => "phantom",
+            Self::Volume => "volume",
+            Self::Skeleton => "skeleton",
+            Self::Radius => "radius",
+            Self::Tree => "tree",
+            Self::Views => "views",
+            Self::Embed => "embed",
+            Self::Render => "render",
+        }
+    }
+
+    /// The stage of a name.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|stage| stage.name() == name)
+    }
+
+    /// Its folder inside a run folder.
+    #[must_use]
+    pub fn folder(self) -> String {
+        format!("stages/{:02}-{}", self as u8, self.name())
+    }
+
+    /// The artifacts it reads, in the order in which its command takes them. A stage that can start from either
+    /// of two (a tree from a mask or from a traced tree) lists the first way.
+    #[must_use]
+    pub fn reads(self) -> &'static [Artifact] {
+        match self {
+            Self::Phantom => &[],
+            Self::Volume => &[Artifact::Volume],
+            Self::Skeleton => &[Artifact::Mask],
+            Self::Radius => &[Artifact::Mask, Artifact::Skeleton],
+            Self::Tree => &[Artifact::Mask, Artifact::Skeleton, Artifact::Spheres],
+            Self::Views => &[Artifact::Tree],
+            Self::Embed => &[Artifact::Tree, Artifact::Views],
+            Self::Render => &[Artifact::Tree, Artifact::Views, Artifact::Embedding],
+        }
+    }
+
+    /// Every file it may write, relative to the run folder.
+    #[must_use]
+    pub fn writes(self) -> Vec<String> {
+        let files: &[&str] = match self {
+            Self::Phantom => &["ct.nii.gz", "truth-mask.nii.gz", "truth.swc"],
+            Self::Volume => &["mask.nii.gz", "dropped.tsv"],
+            Self::Skeleton => &["skeleton.nii.gz"],
+            Self::Radius => &["radius.nii.gz", "spheres.tsv"],
+            Self::Tree => &["/tree.swc", "/topology.tsv"],
+            Self::Views => &["/views.json"],
+            Self::Embed => &["/embedding.json", "/nodes.tsv", "/compare.tsv", "convergence.tsv"],
+            Self::Render => &["/planar.png", "/planar.svg", "/planar.exr", "/global-view.png"],
+        };
+        let folder = self.folder();
+        let mut paths: Vec<String> = files
+            .iter()
+            .map(|file| file.strip_prefix('/').map_or_else(|| format!("{folder}/{file}"), str::to_owned))
+            .collect();
+        paths.push(format!("{folder}/report.json"));
+        paths
+    }
+}
+
+impl fmt::Display for Stage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl Artifact {
+    /// Its file, relative to the run folder.
+    #[must_use]
+    pub fn file(self) -> &'static str {
+        match self {
+            Self::Volume => "stages/00-phantom/ct.nii.gz",
+            Self::Traced => "stages/00-phantom/truth.swc",
+            Self::Mask => "stages/01-volume/mask.nii.gz",
+            Self::Skeleton => "stages/02-skeleton/skeleton.nii.gz",
+            Self::Spheres => "stages/03-radius/spheres.tsv",
+            Self::Tree => "tree.swc",
+            Self::Views => "views.json",
+            Self::Embedding => "embedding.json",
+        }
+    }
+
+    /// What it is, for messages.
+    #[must_use]
+    pub fn what(self) -> &'static str {
+        match self {
+            Self::Volume => "volume",
+            Self::Traced => "traced tree",
+            Self::Mask => "mask",
+            Self::Skeleton => "skeleton",
+            Self::Spheres => "table of inscribed spheres",
+            Self::Tree => "tree",
+            Self::Views => "view hierarchy",
+            Self::Embedding => "embedding",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_artifact_read_is_written_by_an_earlier_stage() {
+        for stage in Stage::ALL {
+            for artifact in stage.reads() {
+                let writer = Stage::ALL.into_iter().find(|s| s.writes().iter().any(|w| w == artifact.file()));
+                assert!(writer.is_some_and(|writer| writer < stage), "{stage} reads {artifact:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn names_are_their_own_inverse() {
+        for stage in Stage::ALL {
+            assert_eq!(Stage::from_name(stage.name()), Some(stage));
+        }
+        assert_eq!(Stage::from_name("emebd"), None);
+    }
+}

@@ -1,0 +1,353 @@
+//! What each stage does with its hand-over data: take, call, hand on, say in one line.
+
+use std::fs::File;
+use std::path::Path;
+use std::sync::Arc;
+
+use espalier_model::table::{Table, fixed};
+use espalier_model::{
+    Embedding, Grid, InscribedSpheres, Ledger, Mask, MethodRow, Report, ViewHierarchy, nifti_out, swc,
+};
+use glam::DAffine3;
+
+use crate::artifacts::{Artifacts, Lookup};
+use crate::config::{Config, Source};
+use crate::error::Error;
+use crate::event::Event;
+use crate::folder::RunFolder;
+use crate::provenance;
+use crate::run::boxed;
+use crate::stage::{Artifact, Stage};
+
+/// What a stage came to: its files, not yet written.
+pub(crate) struct Outcome {
+    pub(crate) files: Vec<(String, Vec<u8>)>,
+    pub(crate) report: Report,
+    pub(crate) line: String,
+}
+
+/// A stage about to be done.
+pub(crate) struct Step<'a> {
+    pub(crate) stage: Stage,
+    pub(crate) config: &'a Config,
+    pub(crate) source: &'a Source,
+    pub(crate) artifacts: &'a mut Artifacts,
+    pub(crate) events: &'a (dyn Fn(Event) + Sync),
+    pub(crate) folder: &'a RunFolder,
+}
+
+/// Does a stage.
+pub(crate) fn perform(step: &mut Step<'_>) -> Result<Outcome, Error> {
+    match step.stage {
+        Stage::Phantom => phantom(step),
+        Stage::Volume => volume(step),
+        Stage::Skeleton => skeleton(step),
+        Stage::Radius => radius(step),
+        Stage::Tree => tree(step),
+        Stage::Views => views(step),
+        Stage::Embed => embed(step),
+        Stage::Render => render(step),
+    }
+}
+
+fn phantom(step: &mut Step<'_>) -> Result<Outcome, Error> {
+    let Config { phantom: params, seed, .. } = step.config;
+    let failed = |error| step.failed(error);
+    let mut report = Report::default();
+    match *step.source {
+        Source::PhantomTree(kind) => {
+            let tree = espalier_phantom::grow_tree(kind, params, *seed).map_err(failed)?;
+            report.count_usize("nodes", tree.n_nodes());
+            let text = swc::write(&tree, &[("phantom", kind.name())]);
+            step.artifacts.traced_scale = Some(swc::SwcScale::millimetres());
+            let line = format!("{}: {} nodes, {} tips", kind.name(), tree.n_nodes(), tree.n_tips());
+            Ok(Outcome { files: vec![step.place(Artifact::Traced, text.into_bytes())], report, line })
+        }
+        Source::PhantomScan(kind) => {
+            let made = espalier_phantom::generate(kind, params, *seed).map_err(failed)?;
+            let scan = espalier_phantom::ct(&made, params, *seed);
+            let grid = scan.grid();
+            report.count_usize("nodes", made.tree.n_nodes());
+            report.count_usize("voxels", grid.n_voxels());
+            let line = format!("{}: {} tips, {}", kind.name(), made.tree.n_tips(), describe_grid(grid));
+            let truth = swc::write(&made.tree, &[("phantom", kind.name())]);
+            let nifti_failed = |error| Error::stage(Stage::Phantom)(boxed(error));
+            let files = vec![
+                step.place(Artifact::Volume, nifti_out::volume(&scan).map_err(nifti_failed)?),
+                step.beside("truth-mask.nii.gz", nifti_out::mask(&made.mask).map_err(nifti_failed)?),
+                step.place(Artifact::Traced, truth.into_bytes()),
+            ];
+            step.artifacts.volume = None;
+            Ok(Outcome { files, report, line })
+        }
+        // A run from a file has no phantom stage.
+        Source::Volume(_) | Source::Tree(_) => {
+            Ok(Outcome { files: Vec::new(), report, line: String::new() })
+        }
+    }
+}
+
+fn volume(step: &mut Step<'_>) -> Result<Outcome, Error> {
+    let (scan, mut report) = step.artifacts.volume(step.lookup())?;
+    let segmented =
+        espalier_volume::segment(&scan, &step.config.volume).map_err(|error| step.failed(error))?;
+    let mask = on_file_grid(segmented.mask);
+    let n_foreground = mask.n_foreground();
+    let line = format!(
+        "{n_foreground} voxels, {:.1} ml of {}",
+        n_foreground as f64 * mask.grid().voxel_volume_mm3() / 1000.0,
+        describe_grid(mask.grid())
+    );
+    report.extend(segmented.report);
+    let files = vec![
+        step.place(Artifact::Mask, nifti_out::mask(&mask).map_err(|error| step.failed(error))?),
+        step.beside("dropped.tsv", segmented.ledger.to_tsv().into_bytes()),
+    ];
+    // The scan is not needed any more, and it is the largest thing of the run.
+    step.artifacts.volume = None;
+    step.artifacts.mask = Some(Arc::new(mask));
+    Ok(Outcome { files, report, line })
+}
+
+fn skeleton(step: &mut Step<'_>) -> Result<Outcome, Error> {
+    let mask = step.artifacts.mask(step.lookup())?;
+    let made =
+        espalier_skeleton::skeletonize(&mask, &step.config.skeleton).map_err(|error| step.failed(error))?;
+    let line = format!("{} voxels", made.skeleton.voxels().len());
+    let bytes = nifti_out::skeleton(&made.skeleton).map_err(|error| step.failed(error))?;
+    step.artifacts.skeleton = Some(Arc::new(made.skeleton));
+    Ok(Outcome { files: vec![step.place(Artifact::Skeleton, bytes)], report: made.report, line })
+}
+
+fn radius(step: &mut Step<'_>) -> Result<Outcome, Error> {
+    let mask = step.artifacts.mask(step.lookup())?;
+    let skeleton = step.artifacts.skeleton(step.lookup())?;
+    let measured = espalier_radius::inscribed_spheres(&mask, &skeleton, &step.config.radius)
+        .map_err(|error| step.failed(error))?;
+    let spheres = measured.spheres;
+    let radii = || spheres.0.iter().map(|sphere| sphere.radius_mm);
+    let line = format!(
+        "{:.2} to {:.2} mm",
+        radii().fold(f64::INFINITY, f64::min),
+        radii().fold(0.0, f64::max)
+    );
+    let mut field = vec![0.0_f32; mask.grid().n_voxels()];
+    for (voxel, sphere) in skeleton.voxels().iter().zip(&spheres.0) {
+        field[mask.grid().index(voxel.map(|coordinate| coordinate as usize))] = sphere.radius_mm as f32;
+    }
+    let radius_image = nifti_out::field(mask.grid(), &field).map_err(|error| step.failed(error))?;
+    let table = spheres.to_tsv();
+    step.artifacts.spheres = Some(Arc::new(step.read_back(&table, InscribedSpheres::from_tsv)?));
+    let files =
+        vec![step.beside("radius.nii.gz", radius_image), step.place(Artifact::Spheres, table.into_bytes())];
+    Ok(Outcome { files, report: measured.report, line })
+}
+
+fn tree(step: &mut Step<'_>) -> Result<Outcome, Error> {
+    let params = &step.config.tree;
+    let (built, mut report) = if step.is_traced() {
+        let (traced, report) = step.artifacts.traced(step.lookup())?;
+        (espalier_tree::from_traced(&traced, params).map_err(|error| step.failed(error))?, report)
+    } else {
+        let mask = step.artifacts.mask(step.lookup())?;
+        let skeleton = step.artifacts.skeleton(step.lookup())?;
+        let spheres = step.artifacts.spheres(step.lookup())?;
+        let built =
+            espalier_tree::build(&mask, &skeleton, &spheres, params).map_err(|error| step.failed(error))?;
+        (built, Report::default())
+    };
+    report.extend(built.report);
+    let text = swc::write(&built.tree, &[("name", &step.config.name)]);
+    let tree = step.read_back(&text, |text| swc::read_tree(text.as_bytes()))?;
+    let line = format!(
+        "{} nodes, {} branches, {} tips, {}{}",
+        tree.n_nodes(),
+        tree.branches().list().len(),
+        tree.n_tips(),
+        readable_length(tree.length_mm()),
+        ledger_phrase(&built.ledger)
+    );
+    step.artifacts.tree = Some(Arc::new(tree));
+    let files = vec![
+        step.place(Artifact::Tree, text.into_bytes()),
+        ("topology.tsv".to_owned(), built.ledger.to_tsv().into_bytes()),
+    ];
+    Ok(Outcome { files, report, line })
+}
+
+fn views(step: &mut Step<'_>) -> Result<Outcome, Error> {
+    let tree = step.artifacts.tree(step.lookup())?;
+    let found = espalier_views::find_views(&tree, &step.config.views, step.config.seed)
+        .map_err(|error| step.failed(error))?;
+    let json = found.hierarchy.to_json();
+    let hierarchy = step.read_back(&json, |text| ViewHierarchy::from_json(text, &tree))?;
+    let line = format!(
+        "global loss {:.3}, {} subtree views, {} planes",
+        hierarchy.global.loss,
+        hierarchy.subtrees.len(),
+        hierarchy.chains.len() + hierarchy.forks.iter().flatten().count()
+    );
+    step.artifacts.views = Some(Arc::new(hierarchy));
+    let files = vec![step.place(Artifact::Views, json.into_bytes())];
+    Ok(Outcome { files, report: found.report, line })
+}
+
+fn embed(step: &mut Step<'_>) -> Result<Outcome, Error> {
+    let tree = step.artifacts.tree(step.lookup())?;
+    let views = step.artifacts.views(step.lookup())?;
+    let (events, stage) = (step.events, step.stage);
+    let progress = move |p: espalier_embed::Progress| {
+        let note = format!("energy {:.4}, crossings {}", p.energy, p.crossings);
+        events(Event::Progress { stage, done: p.done, total: p.total, note });
+    };
+    let embedded =
+        espalier_embed::embed(&tree, &views, &step.config.embed, step.config.seed, &progress)
+            .map_err(|error| step.failed(error))?;
+    let json = embedded.embedding.to_json();
+    let embedding = step.read_back(&json, |text| Embedding::from_json(text, &tree))?;
+    let line = embedding_phrase(&embedding);
+    let files = vec![
+        ("nodes.tsv".to_owned(), embedding.nodes_tsv(&tree).into_bytes()),
+        ("compare.tsv".to_owned(), MethodRow::to_tsv(&embedding.methods).into_bytes()),
+        step.beside("convergence.tsv", convergence_tsv(&embedding).into_bytes()),
+        step.place(Artifact::Embedding, json.into_bytes()),
+    ];
+    step.artifacts.embedding = Some(Arc::new(embedding));
+    Ok(Outcome { files, report: embedded.report, line })
+}
+
+fn render(step: &mut Step<'_>) -> Result<Outcome, Error> {
+    let tree = step.artifacts.tree(step.lookup())?;
+    let views = step.artifacts.views(step.lookup())?;
+    let embedding = step.artifacts.embedding(step.lookup())?;
+    let mut params = step.config.render.clone();
+    params.title.get_or_insert_with(|| step.config.name.clone());
+    let made = espalier_render::render(&tree, &embedding, &views, &params).map_err(|error| step.failed(error))?;
+    let mut files = vec![
+        ("planar.png".to_owned(), made.png),
+        ("planar.svg".to_owned(), made.svg.into_bytes()),
+        ("global-view.png".to_owned(), made.global_view_png),
+    ];
+    if let Some(exr) = made.exr {
+        files.push(("planar.exr".to_owned(), exr));
+    }
+    let line = files.iter().map(|(file, _)| file.as_str()).collect::<Vec<_>>().join(", ");
+    Ok(Outcome { files, report: made.report, line })
+}
+
+impl Step<'_> {
+    fn lookup(&self) -> Lookup<'_> {
+        Lookup { folder: self.folder, stage: self.stage }
+    }
+
+    fn failed(&self, error: impl espalier_model::Diagnose + Send + Sync + 'static) -> Error {
+        Error::stage(self.stage)(boxed(error))
+    }
+
+    /// Whether the tree comes from a traced one. A mask named by the user goes before the config's source.
+    fn is_traced(&self) -> bool {
+        let named = |artifact| self.artifacts.files.contains_key(&artifact);
+        named(Artifact::Traced)
+            || (matches!(self.source, Source::PhantomTree(_) | Source::Tree(_)) && !named(Artifact::Mask))
+    }
+
+    /// An artifact's bytes at its place in the run folder.
+    fn place(&self, artifact: Artifact, bytes: Vec<u8>) -> (String, Vec<u8>) {
+        (artifact.file().to_owned(), bytes)
+    }
+
+    /// The bytes of another file in the stage's own folder.
+    fn beside(&self, name: &str, bytes: Vec<u8>) -> (String, Vec<u8>) {
+        (format!("{}/{name}", self.stage.folder()), bytes)
+    }
+
+    /// What a later reader will make of a text that is about to be written.
+    fn read_back<T, E: espalier_model::Diagnose + Send + Sync + 'static>(
+        &self,
+        text: &str,
+        parse: impl FnOnce(&str) -> Result<T, E>,
+    ) -> Result<T, Error> {
+        parse(text).map_err(|error| self.failed(error))
+    }
+}
+
+/// Checks that a file can be opened and is a file, before anything is written.
+pub(crate) fn check_readable(path: &Path) -> Result<(), Error> {
+    let read = |source| Error::Read { path: path.to_owned(), source };
+    let file = File::open(path).map_err(read)?;
+    if file.metadata().map_err(read)?.is_dir() {
+        return Err(read(std::io::Error::from(std::io::ErrorKind::IsADirectory)));
+    }
+    Ok(())
+}
+
+/// The mask on the grid as a NIfTI-1 file states it, in single precision: what a later stage would read.
+fn on_file_grid(mask: Mask) -> Mask {
+    let affine = mask.grid().world_from_voxel();
+    let single = affine.to_cols_array().map(|value| f64::from(value as f32));
+    match Grid::new(mask.grid().shape(), DAffine3::from_cols_array(&single)) {
+        Ok(grid) => Mask::new(grid, mask.as_slice().to_vec()),
+        // Rounding to single precision cannot shear or flatten a legal grid beyond its tolerance by itself.
+        Err(_) => mask,
+    }
+}
+
+fn describe_grid(grid: &Grid) -> String {
+    let ([nx, ny, nz], spacing) = (grid.shape(), grid.spacing_mm());
+    format!(
+        "{nx}x{ny}x{nz} at {}x{}x{} mm {}",
+        readable(spacing.x),
+        readable(spacing.y),
+        readable(spacing.z),
+        grid.orientation()
+    )
+}
+
+/// A number with at most four significant decimals and no trailing zeros.
+fn readable(value: f64) -> String {
+    let text = format!("{value:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+fn readable_length(length_mm: f64) -> String {
+    if length_mm >= 1.0 { format!("{length_mm:.1} mm") } else { format!("{:.1} µm", length_mm * 1000.0) }
+}
+
+/// What the ledger holds, as a phrase: `; 3 loop_cut, 12 spur_pruned`.
+fn ledger_phrase(ledger: &Ledger) -> String {
+    let mut kinds: Vec<_> = ledger.0.iter().map(|entry| entry.kind).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    let phrases: Vec<String> = kinds
+        .iter()
+        .map(|kind| format!("{} {}", ledger.n_of(*kind), kind.name().replace('_', " ")))
+        .collect();
+    if phrases.is_empty() { String::new() } else { format!("; {}", phrases.join(", ")) }
+}
+
+fn embedding_phrase(embedding: &Embedding) -> String {
+    let certificate = &embedding.certificate;
+    let verdict = if certificate.holds() { "certified" } else { "not planar" };
+    let others: Vec<String> = embedding
+        .methods
+        .iter()
+        .filter(|row| row.method != embedding.method && row.crossings == 0)
+        .map(|row| format!("{} {:.1}°", row.method, row.losses.angle3d_error_mean_deg))
+        .collect();
+    let others = if others.is_empty() { String::new() } else { format!("  ({})", others.join(", ")) };
+    format!(
+        "crossings {} ({verdict})  length loss {:.1} %  angle loss {:.1}°{others}",
+        certificate.crossings,
+        100.0 * embedding.losses.length_loss_mean,
+        embedding.losses.angle3d_error_mean_deg,
+    )
+}
+
+/// The convergence curve: best energy and its crossings by iteration.
+fn convergence_tsv(embedding: &Embedding) -> String {
+    let mut table = Table::new(&["iteration", "evaluations", "energy", "crossings"]);
+    for point in &embedding.trace {
+        table.row(&[&point.iteration, &point.evaluations, &fixed(point.energy, 9), &point.crossings]);
+    }
+    table.into_string()
+}
