@@ -10,6 +10,7 @@
 use espalier_model::Mask;
 
 use crate::params::Orientation;
+use crate::simple::CENTER;
 
 /// The cell is foreground.
 const FOREGROUND: u8 = 1;
@@ -26,6 +27,8 @@ pub(crate) struct Lattice {
     stored_axes: [(usize, bool); 3],
     /// First and last voxel of the box in the mask.
     bounds: ([usize; 3], [usize; 3]),
+    /// Distance between neighbours along the lattice's axes, in mm.
+    spacing: [f64; 3],
 }
 
 impl Lattice {
@@ -40,7 +43,10 @@ impl Lattice {
             }
         }
         let shape = stored_axes.map(|(stored, _)| high[stored] - low[stored] + 3);
-        let mut lattice = Self { cells: vec![0; shape[0] * shape[1] * shape[2]], shape, stored_axes, bounds };
+        let spacing_mm = mask.grid().spacing_mm();
+        let spacing = stored_axes.map(|(stored, _)| spacing_mm[stored]);
+        let cells = vec![0; shape[0] * shape[1] * shape[2]];
+        let mut lattice = Self { cells, shape, stored_axes, bounds, spacing };
 
         for z in low[2]..=high[2] {
             for y in low[1]..=high[1] {
@@ -60,6 +66,16 @@ impl Lattice {
         [1, self.shape[0] as isize, (self.shape[0] * self.shape[1]) as isize]
     }
 
+    /// The number of cells, padding included.
+    pub(crate) fn n_cells(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// The distance between neighbouring cells along x, y, z, in mm.
+    pub(crate) fn spacing(&self) -> [f64; 3] {
+        self.spacing
+    }
+
     /// All foreground cells, in raster order.
     pub(crate) fn foreground(&self) -> Vec<usize> {
         (0..self.cells.len()).filter(|&cell| self.is_foreground(cell)).collect()
@@ -73,6 +89,11 @@ impl Lattice {
     /// Whether a cell is foreground.
     pub(crate) fn is_foreground(&self, cell: usize) -> bool {
         self.cells[cell] & FOREGROUND != 0
+    }
+
+    /// Turns a cell into foreground, without a mark.
+    pub(crate) fn add(&mut self, cell: usize) {
+        self.cells[cell] = FOREGROUND;
     }
 
     /// Turns a foreground cell into background, without a mark.
@@ -119,17 +140,21 @@ impl Lattice {
 
     /// The foreground neighbours of a cell among the 26, in raster order.
     pub(crate) fn neighbors(&self, cell: usize) -> impl Iterator<Item = usize> + use<> {
-        let [_, row, slab] = self.strides();
-        let mut bits = self.neighborhood(cell) & !crate::simple::CENTER;
+        let mut bits = self.neighborhood(cell) & !CENTER;
+        let strides = self.strides();
         std::iter::from_fn(move || {
-            if bits == 0 {
-                return None;
-            }
-            let bit = bits.trailing_zeros() as isize;
+            let bit = (bits != 0).then(|| bits.trailing_zeros())?;
             bits &= bits - 1;
-            let offset = (bit / 9 - 1) * slab + (bit / 3 % 3 - 1) * row + bit % 3 - 1;
-            Some(cell.wrapping_add_signed(offset))
+            Some(cell.wrapping_add_signed(offset(bit, strides)))
         })
+    }
+
+    /// All 26 cells around a foreground cell, in raster order.
+    pub(crate) fn surroundings(&self, cell: usize) -> impl Iterator<Item = usize> + use<> {
+        let strides = self.strides();
+        (0..27)
+            .filter(|bit| 1 << bit != CENTER)
+            .map(move |bit| cell.wrapping_add_signed(offset(bit, strides)))
     }
 
     /// The parity class of a cell, 0..8: two cells of one class are never 26-neighbours.
@@ -138,7 +163,8 @@ impl Lattice {
         (z & 1) << 2 | (y & 1) << 1 | x & 1
     }
 
-    fn coordinates(&self, cell: usize) -> [usize; 3] {
+    /// The coordinates x, y, z of a cell, padding included.
+    pub(crate) fn coordinates(&self, cell: usize) -> [usize; 3] {
         [cell % self.shape[0], cell / self.shape[0] % self.shape[1], cell / (self.shape[0] * self.shape[1])]
     }
 
@@ -159,4 +185,10 @@ impl Lattice {
         }
         stored
     }
+}
+
+/// The way in the flat cell list to the neighbour at a bit of the neighbourhood.
+fn offset(bit: u32, strides: [isize; 3]) -> isize {
+    let digits = [bit % 3, bit / 3 % 3, bit / 9];
+    (0..3).map(|axis| (digits[axis] as isize - 1) * strides[axis]).sum()
 }

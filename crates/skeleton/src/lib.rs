@@ -20,12 +20,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod depth;
 mod error;
 mod euler;
 mod lattice;
 mod params;
 mod simple;
 mod thinning;
+mod tips;
 mod topology;
 
 use espalier_model::{Mask, Report, Skeleton};

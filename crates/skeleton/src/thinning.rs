@@ -12,31 +12,62 @@
 //! of them is deleted. `safe` has a recheck of its own.
 //! **Cost** O(foreground) predicates and memory; O(open voxels) look-ups a sub-iteration.
 
+use crate::depth::{UNITS_PER_SPACING, depths};
 use crate::euler::is_euler_invariant;
 use crate::lattice::Lattice;
 use crate::params::Thinning;
 use crate::simple::{is_endpoint, is_simple, n_neighbors};
+use crate::tips;
 
-/// Thins in place; returns the number of sweeps, the last of which deleted nothing.
+/// The step from one depth level to the next: a third of the smallest spacing, the grain of the 3-4-5 weights.
+const LEVEL_STEP: u16 = (UNITS_PER_SPACING / 3.0) as u16;
+
+/// Thins in place; returns the number of sweeps.
 pub(crate) fn thin(lattice: &mut Lattice, thinning: Thinning) -> usize {
-    let [x, y, z] = lattice.strides();
-    let directions = [-y, y, x, -x, z, -z];
     let mut open = Open::of_border(lattice);
-    for n_sweeps in 1.. {
+    let n_sweeps = match thinning {
+        Thinning::Lee94 => sweep_until_stable(lattice, &mut open, |_| true, recheck_lee94),
+        Thinning::Safe => thin_by_depth(lattice, &mut open),
+    };
+    open.close(lattice);
+    n_sweeps
+}
+
+/// Peels level by level of depth, so that all sides wear away at the same speed whatever their direction, then
+/// gives tips back what the sub-iterations took too much.
+fn thin_by_depth(lattice: &mut Lattice, open: &mut Open) -> usize {
+    let depths = depths(lattice);
+    let deepest = depths.iter().copied().max().unwrap_or(0);
+    let (mut level, mut n_sweeps) = (0, 0);
+    while level < deepest {
+        level = level.saturating_add(LEVEL_STEP);
+        n_sweeps += sweep_until_stable(lattice, open, |cell| depths[cell] <= level, recheck_safe);
+    }
+    tips::regrow(lattice, &depths);
+    n_sweeps
+}
+
+/// Repeats the six sub-iterations over the voxels that are due until none of them deletes a voxel.
+fn sweep_until_stable(
+    lattice: &mut Lattice,
+    open: &mut Open,
+    is_due: impl Fn(usize) -> bool,
+    recheck: impl Fn(&mut Lattice, &mut Open, Vec<usize>) -> usize,
+) -> usize {
+    let [x, y, z] = lattice.strides();
+    let mut n_sweeps = 0;
+    loop {
+        n_sweeps += 1;
         let mut n_deleted = 0;
-        for direction in directions {
-            let collected = collect(lattice, &mut open, direction);
-            n_deleted += match thinning {
-                Thinning::Lee94 => recheck_lee94(lattice, &mut open, &collected),
-                Thinning::Safe => recheck_safe(lattice, &mut open, collected),
-            };
+        for direction in [-y, y, x, -x, z, -z] {
+            let collected = collect(lattice, open, &is_due, direction);
+            n_deleted += recheck(lattice, open, collected);
             open.merge();
         }
         if n_deleted == 0 {
             return n_sweeps;
         }
     }
-    unreachable!("every sweep but the last deletes a voxel")
 }
 
 /// The voxels that may be deletable: border voxels whose neighbourhood changed since they were last refused.
@@ -71,22 +102,36 @@ impl Open {
         }
     }
 
-    /// Puts the freshly opened cells in their place. The sort is stable merging of two sorted runs.
+    /// Takes all marks away.
+    fn close(self, lattice: &mut Lattice) {
+        for cell in self.cells {
+            lattice.unmark(cell);
+        }
+    }
+
+    /// Puts the freshly opened cells in their place. The stable sort merges two sorted runs.
     fn merge(&mut self) {
         self.fresh.sort_unstable();
-        self.cells.append(&mut self.fresh);
-        self.cells.sort();
+        if !self.fresh.is_empty() {
+            self.cells.append(&mut self.fresh);
+            self.cells.sort();
+        }
     }
 }
 
 /// The open voxels that qualify for deletion in `direction`, with the volume as it stands, in raster order.
-fn collect(lattice: &mut Lattice, open: &mut Open, direction: isize) -> Vec<usize> {
+fn collect(
+    lattice: &mut Lattice,
+    open: &mut Open,
+    is_due: &impl Fn(usize) -> bool,
+    direction: isize,
+) -> Vec<usize> {
     let mut collected = Vec::new();
     open.cells.retain(|&cell| {
         if !lattice.is_foreground(cell) {
             return false;
         }
-        if lattice.is_foreground(cell.wrapping_add_signed(direction)) {
+        if !is_due(cell) || lattice.is_foreground(cell.wrapping_add_signed(direction)) {
             return true;
         }
         let neighborhood = lattice.neighborhood(cell);
@@ -103,9 +148,9 @@ fn collect(lattice: &mut Lattice, open: &mut Open, direction: isize) -> Vec<usiz
 }
 
 /// Deletes, in raster order, what is still simple; [Lee94] tests nothing else here.
-fn recheck_lee94(lattice: &mut Lattice, open: &mut Open, collected: &[usize]) -> usize {
+fn recheck_lee94(lattice: &mut Lattice, open: &mut Open, collected: Vec<usize>) -> usize {
     let mut n_deleted = 0;
-    for &cell in collected {
+    for cell in collected {
         if is_simple(lattice.neighborhood(cell)) {
             open.delete(lattice, cell);
             n_deleted += 1;
