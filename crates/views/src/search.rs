@@ -1,0 +1,99 @@
+//! The best direction of a part: a Fibonacci spiral, then a pattern search.
+//!
+//! **Input** an [`Objective`]. **Output** [`Best`]: the direction that minimises it, and the work done.
+//! **Notation** n = `directions`; h the step of the pattern, radians.
+//! **Steps** 1. Evaluate the seeds and n directions of a Fibonacci spiral over the half sphere. 2. Take the
+//! best, the next best at least one spiral spacing away from it, and so on, `refine_starts` in all. 3. From each:
+//! try ±h along two axes of the tangent plane, go to the best of the four if it is better, else halve h; until
+//! h < `refine_step_rad`.
+//! **Guarantees** never worse than any seed or spiral direction; deterministic; ties go to the lower index.
+//! **Source** the argmin of [Hu2022] section 3.1.2; the spiral and the pattern search are textbook methods.
+//! **Cost** about n + 80 · `refine_starts` evaluations.
+
+use std::f64::consts::{PI, TAU};
+
+use espalier_geom::{math, space};
+use glam::DVec3;
+
+use crate::objective::Objective;
+use crate::params::{Params, Search};
+use crate::swarm;
+
+/// Moves of one pattern search: a bound for valleys that wind around the sphere, far above the usual 20.
+const MAX_MOVES: u32 = 500;
+
+/// The best direction found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Best {
+    /// Unit vector towards the camera, its sign arbitrary.
+    pub(crate) direction: DVec3,
+    /// The objective there.
+    pub(crate) value: f64,
+    /// Evaluations of the objective spent.
+    pub(crate) n_evaluations: u64,
+}
+
+/// The best direction, by the search that the parameters name.
+pub(crate) fn best_direction(objective: &Objective, params: &Params, seed: u64) -> Best {
+    match params.search {
+        Search::Fibonacci => fibonacci(objective, params),
+        Search::Pso => swarm::fly(objective, params, seed),
+    }
+}
+
+fn fibonacci(objective: &Objective, params: &Params) -> Best {
+    // Evaluate the seeds and the spiral.
+    let mut directions = objective.seeds();
+    directions.extend(space::half_sphere(params.directions as usize));
+    let values = objective.at_each(&directions);
+    let spacing_rad = (TAU / f64::from(params.directions)).sqrt();
+
+    // Refine the best ones that lie apart.
+    let mut ranked: Vec<usize> = (0..directions.len()).collect();
+    ranked.sort_by(|&a, &b| values[a].total_cmp(&values[b]).then(a.cmp(&b)));
+    let mut best = Best { direction: directions[ranked[0]], value: values[ranked[0]], n_evaluations: 0 };
+    let mut n_evaluations = directions.len() as u64;
+    let mut starts: Vec<DVec3> = Vec::new();
+    for start in ranked {
+        let direction = directions[start];
+        if starts.len() == params.refine_starts as usize {
+            break;
+        }
+        if starts.iter().all(|other| angle_between_axes(*other, direction) >= spacing_rad) {
+            starts.push(direction);
+            let refined =
+                refine(objective, direction, values[start], (0.5 * spacing_rad, params.refine_step_rad));
+            n_evaluations += refined.n_evaluations;
+            best = if refined.value < best.value { refined } else { best };
+        }
+    }
+    Best { n_evaluations, ..best }
+}
+
+/// A pattern search on the tangent plane, with steps from the first to the second of `steps_rad`.
+fn refine(objective: &Objective, start: DVec3, value: f64, steps_rad: (f64, f64)) -> Best {
+    let mut best = Best { direction: start, value, n_evaluations: 0 };
+    let (mut step_rad, last_step_rad) = steps_rad;
+    let mut n_moves = 0;
+    while step_rad >= last_step_rad && n_moves < MAX_MOVES {
+        let (right, up) = space::plane_axes(best.direction, objective.reference.up);
+        let (sin, cos) = math::sin_cos(step_rad);
+        let around = [right, up, -right, -up].map(|axis| best.direction * cos + axis * sin);
+        let values = objective.at_each(&around);
+        best.n_evaluations += 4;
+        let nearest = (1..4).fold(0, |least, i| if values[i] < values[least] { i } else { least });
+        if values[nearest] < best.value {
+            best = Best { direction: around[nearest].normalize(), value: values[nearest], ..best };
+            n_moves += 1;
+        } else {
+            step_rad *= 0.5;
+        }
+    }
+    best
+}
+
+/// The angle between two lines through the origin, in [0, π/2].
+fn angle_between_axes(a: DVec3, b: DVec3) -> f64 {
+    let angle = espalier_geom::angle::between(a, b);
+    angle.min(PI - angle)
+}
