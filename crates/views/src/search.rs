@@ -2,20 +2,21 @@
 //!
 //! **Input** an [`Objective`]. **Output** [`Best`]: the direction that minimises it, and the work done.
 //! **Notation** n = `directions`; h the step of the pattern, radians.
-//! **Steps** 1. Evaluate the seeds and n directions of a Fibonacci spiral over the half sphere. 2. Take the
+//! **Steps** 1. Evaluate the seeds, and unless one of them loses nothing, n directions of a Fibonacci spiral over the half
+//! sphere. 2. Take the
 //! best, the next best at least one spiral spacing away from it, and so on, `refine_starts` in all. 3. From each:
 //! try ±h along two axes of the tangent plane, go to the best of the four if it is better, else halve h; until
 //! h < `refine_step_rad`.
 //! **Guarantees** never worse than any seed or spiral direction; deterministic; ties go to the lower index.
 //! **Source** the argmin of [Hu2022] section 3.1.2; the spiral and the pattern search are textbook methods.
-//! **Cost** about n + 80 · `refine_starts` evaluations.
+//! **Cost** 3 evaluations for a straight or planar part, else about n + 150 · `refine_starts`.
 
 use std::f64::consts::{PI, TAU};
 
 use espalier_geom::{math, space};
 use glam::DVec3;
 
-use crate::objective::Objective;
+use crate::objective::{LOSSLESS, Objective};
 use crate::params::{Params, Search};
 use crate::swarm;
 
@@ -42,37 +43,47 @@ pub(crate) fn best_direction(objective: &Objective, params: &Params, seed: u64) 
 }
 
 fn fibonacci(objective: &Objective, params: &Params) -> Best {
-    // Evaluate the seeds and the spiral.
-    let mut directions = objective.seeds();
-    directions.extend(space::half_sphere(params.directions as usize));
-    let values = objective.at_each(&directions);
-    let spacing_rad = (TAU / f64::from(params.directions)).sqrt();
+    // The seeds, one of which is the answer for straight and planar parts.
+    let seeds = objective.seeds();
+    let mut candidates = evaluated(objective, &seeds);
+    if let Some(&best) = candidates.first().filter(|best| best.value <= LOSSLESS) {
+        return Best { n_evaluations: candidates.len() as u64, ..best };
+    }
 
-    // Refine the best ones that lie apart.
-    let mut ranked: Vec<usize> = (0..directions.len()).collect();
-    ranked.sort_by(|&a, &b| values[a].total_cmp(&values[b]).then(a.cmp(&b)));
-    let mut best = Best { direction: directions[ranked[0]], value: values[ranked[0]], n_evaluations: 0 };
-    let mut n_evaluations = directions.len() as u64;
+    // The spiral.
+    let spiral: Vec<DVec3> = space::half_sphere(params.directions as usize).collect();
+    candidates.extend(evaluated(objective, &spiral));
+    candidates.sort_by(|a, b| a.value.total_cmp(&b.value));
+    let mut best = Best { n_evaluations: candidates.len() as u64, ..candidates[0] };
+
+    // The refinement of the best ones that lie apart.
+    let spacing_rad = (TAU / f64::from(params.directions)).sqrt();
+    let steps_rad = (0.5 * spacing_rad, params.refine_step_rad);
     let mut starts: Vec<DVec3> = Vec::new();
-    for start in ranked {
-        let direction = directions[start];
-        if starts.len() == params.refine_starts as usize {
-            break;
-        }
-        if starts.iter().all(|other| angle_between_axes(*other, direction) >= spacing_rad) {
-            starts.push(direction);
-            let refined =
-                refine(objective, direction, values[start], (0.5 * spacing_rad, params.refine_step_rad));
-            n_evaluations += refined.n_evaluations;
-            best = if refined.value < best.value { refined } else { best };
+    for candidate in candidates {
+        let lies_apart = starts.iter().all(|&start| between_axes(start, candidate.direction) >= spacing_rad);
+        if lies_apart && starts.len() < params.refine_starts as usize {
+            starts.push(candidate.direction);
+            let refined = refine(objective, candidate, steps_rad);
+            let n_evaluations = best.n_evaluations + refined.n_evaluations;
+            best = Best { n_evaluations, ..if refined.value < best.value { refined } else { best } };
         }
     }
-    Best { n_evaluations, ..best }
+    best
+}
+
+/// The directions with their values, best first, the order among equals kept.
+fn evaluated(objective: &Objective, directions: &[DVec3]) -> Vec<Best> {
+    let values = objective.at_each(directions);
+    let with_value = |(&direction, value)| Best { direction, value, n_evaluations: 0 };
+    let mut list: Vec<Best> = directions.iter().zip(values).map(with_value).collect();
+    list.sort_by(|a, b| a.value.total_cmp(&b.value));
+    list
 }
 
 /// A pattern search on the tangent plane, with steps from the first to the second of `steps_rad`.
-fn refine(objective: &Objective, start: DVec3, value: f64, steps_rad: (f64, f64)) -> Best {
-    let mut best = Best { direction: start, value, n_evaluations: 0 };
+fn refine(objective: &Objective, start: Best, steps_rad: (f64, f64)) -> Best {
+    let mut best = start;
     let (mut step_rad, last_step_rad) = steps_rad;
     let mut n_moves = 0;
     while step_rad >= last_step_rad && n_moves < MAX_MOVES {
@@ -93,7 +104,7 @@ fn refine(objective: &Objective, start: DVec3, value: f64, steps_rad: (f64, f64)
 }
 
 /// The angle between two lines through the origin, in [0, π/2].
-fn angle_between_axes(a: DVec3, b: DVec3) -> f64 {
+fn between_axes(a: DVec3, b: DVec3) -> f64 {
     let angle = espalier_geom::angle::between(a, b);
     angle.min(PI - angle)
 }

@@ -5,12 +5,13 @@
 //! γ uniform in (−1, 1) per coordinate, c the iteration.
 //! **Steps** 1. The seeds are the first particles, the rest is uniform on the sphere, with random U_i. 2. In each
 //! iteration evaluate all, update P_ig and P_g, and move by Eq. 5:
-//! P_i ← P_i + ω_g (P_g − P_i) + ω_p (P_ig − P_i) + ω_inert (U_i + γ), then back onto the sphere.
+//! P_i ← P_i + ω_g (P_g − P_i) + ω_p (P_ig − P_i) + ω_inert (U_i + γ), then back onto the sphere. Stop
+//! when nothing is lost, or after the last iteration.
 //! **Guarantees** never worse than any seed; the numbers of a particle depend on (seed, particle, iteration) only,
 //! so the result does not depend on thread count.
 //! **Source** [Hu2022] section 3.1 and Eq. 5, 256 particles and 100 iterations.
 //! **Differs from the source** the loss does not tell v from −v, so a particle is drawn to the nearer of the two.
-//! **Cost** `particles` × `iterations` evaluations.
+//! **Cost** at most `particles` × `iterations` evaluations.
 
 use std::f64::consts::TAU;
 
@@ -18,7 +19,7 @@ use espalier_geom::math;
 use espalier_geom::random::{Purpose, Stream};
 use glam::DVec3;
 
-use crate::objective::Objective;
+use crate::objective::{LOSSLESS, Objective};
 use crate::params::Params;
 use crate::search::Best;
 
@@ -36,6 +37,9 @@ pub(crate) fn fly(objective: &Objective, params: &Params, seed: u64) -> Best {
         (0..params.particles).map(|i| Particle::start(seed, i, &seeds)).collect();
     let mut best = Best { direction: particles[0].position, value: f64::INFINITY, n_evaluations: 0 };
     for iteration in 1..=params.iterations {
+        if best.value <= LOSSLESS {
+            break;
+        }
         // Evaluate all, and update the particles' own bests and the best of all.
         let positions: Vec<DVec3> = particles.iter().map(|particle| particle.position).collect();
         let values = objective.at_each(&positions);
