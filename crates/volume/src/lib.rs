@@ -1,1 +1,46 @@
-//! To be written.
+//! CT volumes in, masks out.
+//!
+//! | step | file |
+//! |---|---|
+//! | bytes of a file, decompressed and bounded | `source` |
+//! | the 348 bytes of the header, checked | `nifti/header` |
+//! | voxel axes in the world: the affine ladder | `nifti/affine` |
+//! | stored numbers of any type and byte order | `nifti/voxels` |
+//! | sheared axes to orthogonal ones | `orthogonal` |
+//! | **[`read`]**: file → [`Volume`](espalier_model::Volume) | `read` |
+//! | what a volume is: mask, labels, CT | `kind` |
+//! | mask, label, threshold band | `select` |
+//! | region growing from a seed | `region_grow` |
+//! | connected components by runs of voxels | `runs`, `components` |
+//! | cavities filled | `cavities` |
+//! | **[`segment`]**: `Volume` → [`Mask`](espalier_model::Mask) | `segment` |
+//!
+//! **Spaces** World is RAS+ mm. A voxel is (x, y, z) on the file's own axes, x fastest.
+//!
+//! **Architecture Invariant:** this is the only stage that reads files, and it writes none. No byte of a file
+//! makes it panic, recurse, or hold more than the limit that the caller states.
+
+mod source;
+
+mod nifti;
+
+mod orthogonal;
+mod read;
+
+mod kind;
+mod region_grow;
+mod runs;
+mod select;
+
+mod cavities;
+mod components;
+mod segment;
+
+mod error;
+mod params;
+
+pub use error::{Error, ReadError};
+pub use kind::{Kind, inspect_kind};
+pub use params::{AssumedSpace, Components, Method, Params, ReadOptions};
+pub use read::{Loaded, read};
+pub use segment::{Segmented, segment};

@@ -1,0 +1,83 @@
+//! What a volume is: a mask, a label map, or a CT.
+//!
+//! **Input** a volume. **Output** [`Kind`], from its finite values alone.
+//! **Steps** one pass that keeps the distinct values as long as they are few.
+//! **Cost** O(voxels · log distinct values) time, constant memory.
+
+use espalier_model::Volume;
+
+/// More distinct values than this, and a volume of whole numbers is no label map.
+const MAX_LABELS: usize = 512;
+/// The largest number that is still taken for a label.
+const MAX_LABEL: f64 = 65_535.0;
+
+/// What a volume is by its values.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Kind {
+    /// Two values: 0 and another one, or else the smaller and the larger.
+    Mask {
+        /// The value of the background.
+        background: f64,
+        /// The value of the organ.
+        foreground: f64,
+    },
+    /// Several whole numbers from 0 to 65,535, at most 512 of them.
+    Labels {
+        /// The values, ascending.
+        values: Vec<f64>,
+    },
+    /// Anything else: a scan.
+    Ct {
+        /// The smallest finite value.
+        min: f64,
+        /// The largest finite value.
+        max: f64,
+    },
+    /// One value everywhere; NaN if there is no finite value at all.
+    Constant {
+        /// The value.
+        value: f64,
+    },
+}
+
+/// Tells what a volume is. Values that are not finite do not count.
+///
+/// ```
+/// use espalier_model::{Grid, Volume, Voxels};
+/// use espalier_volume::{Kind, inspect_kind};
+/// let grid = Grid::axis_aligned([3, 1, 1], glam::DVec3::ONE, glam::DVec3::ZERO).unwrap();
+/// let array = ndarray::arr3(&[[[0_i16, 255, 0]]]);
+/// let volume = Volume::new(grid, Voxels::I16(array), 1.0, 0.0);
+/// assert_eq!(inspect_kind(&volume), Kind::Mask { background: 0.0, foreground: 255.0 });
+/// ```
+#[must_use]
+pub fn inspect_kind(volume: &Volume) -> Kind {
+    let mut distinct: Vec<f64> = Vec::new();
+    let (mut min, mut max) = (f64::INFINITY, f64::NEG_INFINITY);
+    let mut last = f64::NAN;
+    volume.for_each_value(|value| {
+        // Most voxels are as their neighbour before.
+        if value == last || !value.is_finite() {
+            return;
+        }
+        last = value;
+        (min, max) = (min.min(value), max.max(value));
+        if distinct.len() <= MAX_LABELS
+            && let Err(place) = distinct.binary_search_by(|known| known.total_cmp(&(value + 0.0)))
+        {
+            distinct.insert(place, value + 0.0);
+        }
+    });
+
+    let is_label = |&value: &f64| value.trunc() == value && (0.0..=MAX_LABEL).contains(&value);
+    match distinct[..] {
+        [] => Kind::Constant { value: f64::NAN },
+        [value] => Kind::Constant { value },
+        [low, high] if high == 0.0 => Kind::Mask { background: high, foreground: low },
+        [low, high] => Kind::Mask { background: low, foreground: high },
+        _ if distinct.len() <= MAX_LABELS && distinct.iter().all(is_label) => {
+            Kind::Labels { values: distinct }
+        }
+        _ => Kind::Ct { min, max },
+    }
+}

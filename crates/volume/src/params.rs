@@ -1,0 +1,246 @@
+//! What the caller may choose: how a file is read, how a volume becomes a mask.
+
+use std::fmt;
+
+use espalier_model::diagnose::ParamError;
+use serde::de::{self, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// How a file is read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReadOptions {
+    /// The most bytes that the voxels may take in memory; a file that declares more is refused before anything
+    /// is allocated. Default: 4 GiB, room for 1290³ voxels of 16 bits.
+    pub max_bytes: u64,
+    /// Which volume of a 4D file, from 0. Default: none, so that a 4D file is refused by name.
+    pub volume_index: Option<usize>,
+    /// What to take the voxel axes for when the file does not say. Default: none, so that it is refused.
+    pub assume_space: Option<AssumedSpace>,
+    /// Mm for one unit of the file's coordinates, whatever its header says; above 0. Default: the header's.
+    pub unit_mm: Option<f64>,
+    /// Refuse sheared voxel axes instead of resampling the volume to orthogonal ones. Default: no.
+    pub strict: bool,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self { max_bytes: 4 << 30, volume_index: None, assume_space: None, unit_mm: None, strict: false }
+    }
+}
+
+/// The voxel axes of a file that does not state them: where x, y and z point. Voxel (0, 0, 0) is the origin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum AssumedSpace {
+    /// Right, anterior, superior: what the NIfTI-1 standard says ("method 1").
+    Ras,
+    /// Left, anterior, superior: what ANALYZE files were mostly meant as, and how several programs read them.
+    Las,
+    /// Left, posterior, superior: the axes of DICOM.
+    Lps,
+}
+
+/// How a volume becomes a mask.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Params {
+    /// How the organ's voxels are chosen. Default `auto`: a volume of two values is the mask itself, a volume with
+    /// `label` set is a label map, and everything else must be told.
+    pub method: Method,
+    /// The lower end of the band of values, inclusive, in scaled units (HU for CT). For `threshold` and
+    /// `region-grow`. Default: none, no lower end. A larger value gives a smaller mask.
+    pub lower: Option<f64>,
+    /// The upper end of the band, inclusive. Default: none, no upper end. A larger value gives a larger mask; in
+    /// an airway a little too much lets it leak into the lung.
+    pub upper: Option<f64>,
+    /// For `region-grow`: the voxel (x, y, z) from 0 on the file's own axes at which growing starts.
+    pub seed_voxel: Option<[i64; 3]>,
+    /// For `region-grow`: the point in RAS+ mm at which growing starts, instead of `seed_voxel`.
+    pub seed_mm: Option<[f64; 3]>,
+    /// For `label`: the value of the organ in the label map.
+    pub label: Option<f64>,
+    /// How many 26-connected components stay, the largest first: `"largest"`, `"all"`, or a number from 1.
+    /// Default `"largest"`: the islands of a mask are mostly noise, and a tree is one piece.
+    pub components: Components,
+    /// Whether background that is closed in by the mask (6-connected) becomes foreground. Default true: a cavity
+    /// would become a closed shell in the skeleton.
+    pub fill_cavities: bool,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            method: Method::Auto,
+            lower: None,
+            upper: None,
+            seed_voxel: None,
+            seed_mm: None,
+            label: None,
+            components: Components::Largest,
+            fill_cavities: true,
+        }
+    }
+}
+
+/// How the organ's voxels are chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// By what the volume is; never a silent guess.
+    Auto,
+    /// Every voxel that is not 0; of two values that are both not 0, the larger.
+    Mask,
+    /// Every voxel with a value in the band.
+    Threshold,
+    /// The voxels in the band that are 6-connected with the seed.
+    RegionGrow,
+    /// Every voxel with the value `label`.
+    Label,
+}
+
+impl Method {
+    /// The name in the config.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Mask => "mask",
+            Self::Threshold => "threshold",
+            Self::RegionGrow => "region-grow",
+            Self::Label => "label",
+        }
+    }
+
+    fn uses_band(self) -> bool {
+        matches!(self, Self::Threshold | Self::RegionGrow)
+    }
+
+    fn uses_label(self) -> bool {
+        matches!(self, Self::Auto | Self::Label)
+    }
+}
+
+/// How many components of a mask stay. In a config `"largest"`, `"all"` or a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Components {
+    /// The one with the most voxels.
+    Largest,
+    /// All of them.
+    All,
+    /// So many, those with the most voxels.
+    Count(u32),
+}
+
+impl Components {
+    /// The most components that stay.
+    #[must_use]
+    pub fn limit(self) -> usize {
+        match self {
+            Self::Largest => 1,
+            Self::All => usize::MAX,
+            Self::Count(count) => count as usize,
+        }
+    }
+}
+
+impl Serialize for Components {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Largest => serializer.serialize_str("largest"),
+            Self::All => serializer.serialize_str("all"),
+            Self::Count(count) => serializer.serialize_u32(*count),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Components {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(ComponentsVisitor)
+    }
+}
+
+struct ComponentsVisitor;
+
+impl Visitor<'_> for ComponentsVisitor {
+    type Value = Components;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("\"largest\", \"all\" or a whole number from 1")
+    }
+
+    fn visit_str<E: de::Error>(self, text: &str) -> Result<Components, E> {
+        match text {
+            "largest" => Ok(Components::Largest),
+            "all" => Ok(Components::All),
+            _ => Err(E::invalid_value(de::Unexpected::Str(text), &self)),
+        }
+    }
+
+    fn visit_i64<E: de::Error>(self, count: i64) -> Result<Components, E> {
+        let legal = u32::try_from(count).ok().filter(|&count| count > 0);
+        legal.map(Components::Count).ok_or_else(|| E::invalid_value(de::Unexpected::Signed(count), &self))
+    }
+
+    fn visit_u64<E: de::Error>(self, count: u64) -> Result<Components, E> {
+        self.visit_i64(i64::try_from(count).unwrap_or(i64::MAX))
+    }
+}
+
+impl Params {
+    /// Checks each value, and that no key is set that the method would not look at.
+    ///
+    /// # Errors
+    /// The first key that is out of its range, missing, or without use.
+    pub fn validate(&self) -> Result<(), ParamError> {
+        let method = self.method;
+        let unused = |key, is_set: bool, needs: &str| {
+            let message = format!("has no use with method = \"{}\", only with {needs}", method.name());
+            ParamError::check(key, !is_set, message)
+        };
+        if !method.uses_band() {
+            let needs = "\"threshold\" and \"region-grow\"";
+            unused("lower", self.lower.is_some(), needs)?;
+            unused("upper", self.upper.is_some(), needs)?;
+        }
+        if method != Method::RegionGrow {
+            unused("seed_voxel", self.seed_voxel.is_some(), "\"region-grow\"")?;
+            unused("seed_mm", self.seed_mm.is_some(), "\"region-grow\"")?;
+        }
+        if !method.uses_label() {
+            unused("label", self.label.is_some(), "\"label\"")?;
+        }
+        self.validate_band()?;
+        self.validate_seed()?;
+        ParamError::check("label", self.label.is_none_or(f64::is_finite), "must be a finite number")?;
+        let needs_label = method == Method::Label && self.label.is_none();
+        ParamError::check("label", !needs_label, "must be set with method = \"label\"")?;
+        let keeps_one = self.components.limit() > 0;
+        ParamError::check("components", keeps_one, "must be \"largest\", \"all\" or a number from 1, is 0")
+    }
+
+    fn validate_band(&self) -> Result<(), ParamError> {
+        ParamError::check("lower", self.lower.is_none_or(|v| !v.is_nan()), "must be a number, is nan")?;
+        ParamError::check("upper", self.upper.is_none_or(|v| !v.is_nan()), "must be a number, is nan")?;
+        let is_open = self.lower.is_none() && self.upper.is_none();
+        let message = format!("or `lower` must be set with method = \"{}\"", self.method.name());
+        ParamError::check("upper", !(self.method.uses_band() && is_open), message)?;
+        let (lower, upper) = self.band();
+        ParamError::check("upper", lower <= upper, format!("must be at least lower = {lower}, is {upper}"))
+    }
+
+    fn validate_seed(&self) -> Result<(), ParamError> {
+        let is_finite = self.seed_mm.is_none_or(|seed| seed.iter().all(|v| v.is_finite()));
+        ParamError::check("seed_mm", is_finite, "must be three finite numbers")?;
+        let is_double = self.seed_mm.is_some() && self.seed_voxel.is_some();
+        ParamError::check("seed_mm", !is_double, "must not be set together with seed_voxel")?;
+        let is_missing =
+            self.method == Method::RegionGrow && self.seed_mm.is_none() && self.seed_voxel.is_none();
+        ParamError::check("seed_voxel", !is_missing, "or seed_mm must be set with method = \"region-grow\"")
+    }
+
+    /// The band of values, with infinite ends where none is set.
+    #[must_use]
+    pub fn band(&self) -> (f64, f64) {
+        (self.lower.unwrap_or(f64::NEG_INFINITY), self.upper.unwrap_or(f64::INFINITY))
+    }
+}

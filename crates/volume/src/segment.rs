@@ -1,0 +1,85 @@
+//! [`Volume`] → [`Mask`].
+//!
+//! **Input** a volume and [`Params`]. **Output** [`Segmented`].
+//! **Steps** 1. choose the organ's voxels by value, or by growing from a seed; 2. drop all but the largest
+//! components; 3. fill cavities.
+//! **Guarantees** the mask has at least one voxel, and the volume's grid; every step's effect is in the report.
+
+use espalier_model::{Ledger, Mask, Report, Volume};
+
+use crate::select::select;
+use crate::{Error, Params, cavities, components};
+
+/// A mask, and what was done to get it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Segmented {
+    /// The organ.
+    pub mask: Mask,
+    /// An entry for each component that was dropped, largest first; beyond 200 one entry for all others.
+    pub ledger: Ledger,
+    /// Counts `selected_voxels`, `selected_ml`, `components`, `components_dropped`, `components_dropped_voxels`,
+    /// `component_largest_voxels`, `component_dropped_largest_voxels`, `cavities_filled`,
+    /// `cavities_filled_voxels`, `foreground_voxels`, `foreground_ml`.
+    pub report: Report,
+}
+
+/// Makes a mask of a volume.
+///
+/// ```
+/// use espalier_model::{Grid, Volume, Voxels};
+/// use espalier_volume::{Method, Params, segment};
+/// let grid = Grid::axis_aligned([4, 1, 1], glam::DVec3::ONE, glam::DVec3::ZERO).unwrap();
+/// let ct = Volume::new(grid, Voxels::I16(ndarray::arr3(&[[[-1000_i16, -990, 40, 55]]])), 1.0, 0.0);
+/// let params = Params { method: Method::Threshold, upper: Some(-900.0), ..Params::default() };
+/// assert_eq!(segment(&ct, &params).unwrap().mask.n_foreground(), 2);
+/// assert!(segment(&ct, &Params::default()).is_err()); // a CT: the method must be given
+/// ```
+///
+/// # Errors
+/// [`Error`] for parameters out of range, a volume that needs a method, a seed outside the volume or the band,
+/// and for a choice without any voxel.
+pub fn segment(volume: &Volume, params: &Params) -> Result<Segmented, Error> {
+    params.validate()?;
+    let grid = volume.grid();
+    let mut report = Report::default();
+    let millilitres = |n_voxels: usize| n_voxels as f64 * grid.voxel_volume_mm3() / 1000.0;
+
+    // Choose the organ's voxels.
+    let selection = select(volume, params)?;
+    let mut voxels = selection.voxels;
+    let n_selected = voxels.iter().filter(|&&voxel| voxel).count();
+    if n_selected == 0 {
+        let (min, max) = range(volume);
+        return Err(Error::Empty { what: selection.what, min, max });
+    }
+    report.count_usize("selected_voxels", n_selected);
+    report.count("selected_ml", millilitres(n_selected));
+    if n_selected == voxels.len() {
+        report.warn("W-VOLUME-FULL", format!("{} holds every voxel of the volume", selection.what));
+    }
+
+    // Drop all but the largest components.
+    let ledger = components::keep_largest(&mut voxels, grid, params.components.limit(), &mut report);
+
+    // Fill cavities.
+    if params.fill_cavities {
+        cavities::fill(&mut voxels, grid.shape(), &mut report);
+    }
+    let mask = Mask::new(grid.clone(), voxels);
+    let n_foreground = mask.n_foreground();
+    report.count_usize("foreground_voxels", n_foreground);
+    report.count("foreground_ml", millilitres(n_foreground));
+    Ok(Segmented { mask, ledger, report })
+}
+
+/// The smallest and the largest finite value; NaN if there is none.
+fn range(volume: &Volume) -> (f64, f64) {
+    let (mut min, mut max) = (f64::NAN, f64::NAN);
+    volume.for_each_value(|value| {
+        if value.is_finite() {
+            // The minimum of NaN and a number is the number.
+            (min, max) = (min.min(value), max.max(value));
+        }
+    });
+    (min, max)
+}
