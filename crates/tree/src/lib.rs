@@ -1,1 +1,176 @@
-//! To be written.
+//! Skeleton voxels and inscribed spheres in, one rooted tree out; also: a traced structure in, one rooted tree out.
+//!
+//! | step | file | what happens |
+//! |--:|---|---|
+//! | 1 | `adjacency`, `graph` | 26-neighbours; junction clusters become one hub, chains become pieces |
+//! | 2 | `components` | one component is the tree |
+//! | 3 | `loops` | every loop is opened at its thinnest place |
+//! | 4 | `living`, `prune`, `root` | spurs go, the root is chosen |
+//! | 5 | `outline` | lines between root, forks and tips |
+//! | 6 | `forks` | forks move to where the branches' axes meet |
+//! | 7 | `tips` | free ends go to the end of the mask |
+//! | 8 | `smooth` | the voxel staircase goes |
+//! | 9 | `merge`, `resample` | nodes where the shape changes |
+//! | – | `traced` | roots, duplicates and radii of a traced structure |
+//!
+//! Whatever is cut, pruned, dropped, extended or merged stands in the ledger with place, radius, length and reason.
+//!
+//! **Guarantees** same input and parameters, same tree; no recursion; ties go to the lower index, hence to storage order.
+
+mod adjacency;
+mod components;
+mod curve;
+mod error;
+mod forks;
+mod graph;
+mod living;
+mod loops;
+mod mask_walk;
+mod merge;
+mod outline;
+mod params;
+mod prune;
+mod resample;
+mod root;
+mod smooth;
+mod summary;
+mod tips;
+mod traced;
+mod union_find;
+
+use espalier_model::swc::Traced;
+use espalier_model::{InscribedSpheres, Ledger, Mask, Node, Report, Skeleton, Tree};
+use glam::DVec3;
+
+pub use error::Error;
+pub use params::{Components, Loops, MissingRadii, Params, Resample, Root, Roots, Tips};
+
+/// A tree, what was done to get it, and its figures.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Built {
+    /// The tree, RAS+ mm.
+    pub tree: Tree,
+    /// Everything cut, pruned, dropped, extended, merged or repaired.
+    pub ledger: Ledger,
+    /// Counts and warnings.
+    pub report: Report,
+}
+
+/// Builds the tree of a skeleton.
+///
+/// `mask`, `skeleton` and `spheres` belong together: one grid, one sphere for each skeleton voxel, in its order.
+///
+/// # Errors
+/// [`Error`] if the skeleton is empty, the three do not belong together, a parameter is outside its range, or the
+/// topology is refused by policy.
+pub fn build(
+    mask: &Mask,
+    skeleton: &Skeleton,
+    spheres: &InscribedSpheres,
+    params: &Params,
+) -> Result<Built, Error> {
+    params.validate()?;
+    check_input(mask, skeleton, spheres)?;
+    let (mut ledger, mut report) = (Ledger::default(), Report::default());
+    report.count_usize("skeleton_voxels", skeleton.voxels().len());
+
+    // Topology: one component, no loops, no spurs, a root.
+    let voxel_graph = graph::of_voxels(&adjacency::Adjacency::of(skeleton), spheres);
+    let (mut graph, _) = components::select(voxel_graph, params, &mut ledger)?;
+    loops::open(&mut graph, params, &mut ledger)?;
+    let mut living = living::Living::new(&graph);
+    let is_protected = root::protected_tips(&mut living, params);
+    prune::prune(&mut living, &is_protected, params, &mut ledger);
+    let choice = root::choose(&living, params);
+    if let Some(runner_up) = choice.runner_up {
+        let names = ["root_runner_up_x_mm", "root_runner_up_y_mm", "root_runner_up_z_mm"];
+        summary::point(&mut report, names, graph.hubs[runner_up].sample.position_mm);
+    }
+
+    // Geometry: forks and tips where they belong, the staircase smoothed away.
+    let mut outline = outline::trace(&living, choice.root);
+    smooth::space_evenly(&mut outline, mask.grid());
+    report.count("forks_moved_mean_mm", forks::relocate(&mut outline, mask));
+    smooth::space_evenly(&mut outline, mask.grid());
+    if params.tips == Tips::Extend {
+        tips::extend(&mut outline, mask, &mut ledger);
+        smooth::space_evenly(&mut outline, mask.grid());
+    }
+    smooth::smooth(&mut outline, mask.grid(), params.smooth_voxels);
+
+    let kind = if params.resample == Resample::Auto { Resample::Shape } else { params.resample };
+    finish(&outline_nodes(&outline), kind, params, ledger, report)
+}
+
+/// Makes one rooted tree of a traced structure.
+///
+/// # Errors
+/// [`Error`] if there is no node, a parameter is outside its range, or several roots are refused by policy.
+pub fn from_traced(traced: &Traced, params: &Params) -> Result<Built, Error> {
+    params.validate()?;
+    let (mut ledger, mut report) = (Ledger::default(), Report::default());
+    report.count_usize("traced_nodes", traced.nodes.len());
+    let (nodes, n_roots) = traced::single_tree(traced, params, &mut ledger)?;
+    report.count_usize("traced_roots", n_roots);
+    let kind = if params.resample == Resample::Auto { Resample::None } else { params.resample };
+    finish(&nodes, kind, params, ledger, report)
+}
+
+fn check_input(mask: &Mask, skeleton: &Skeleton, spheres: &InscribedSpheres) -> Result<(), Error> {
+    let (n_voxels, n_spheres) = (skeleton.voxels().len(), spheres.0.len());
+    if mask.grid() != skeleton.grid() {
+        return Err(Error::Grids { mask: mask.grid().shape(), skeleton: skeleton.grid().shape() });
+    }
+    if n_voxels == 0 {
+        return Err(Error::EmptySkeleton { n_foreground: mask.n_foreground() });
+    }
+    if n_voxels != n_spheres {
+        return Err(Error::SphereCount { n_voxels, n_spheres });
+    }
+    let voxel_from_world = mask.grid().voxel_from_world();
+    let beyond = DVec3::from_array(mask.grid().shape().map(|extent| extent as f64));
+    for (voxel, sphere) in spheres.0.iter().enumerate() {
+        let (center_mm, radius_mm) = (sphere.center_mm, sphere.radius_mm);
+        let center_voxel = voxel_from_world.transform_point3(center_mm);
+        let is_near_grid = center_voxel.cmpge(DVec3::NEG_ONE).all() && center_voxel.cmple(beyond).all();
+        if !is_near_grid || !radius_mm.is_finite() || radius_mm < 0.0 {
+            return Err(Error::BadSphere { voxel, center_mm, radius_mm });
+        }
+    }
+    Ok(())
+}
+
+/// The nodes of an outline, parents first, as dense as its samples.
+fn outline_nodes(outline: &outline::Outline) -> Vec<Node> {
+    let node = |sample: graph::Sample, parent: Option<usize>| Node {
+        position_mm: sample.position_mm,
+        radius_mm: sample.radius_mm,
+        parent,
+        kind: 0,
+    };
+    let mut nodes = vec![node(outline.hubs[0].sample, None)];
+    let mut node_of_hub = vec![0; outline.hubs.len()];
+    for line in &outline.lines {
+        let mut parent = node_of_hub[line.from];
+        for &sample in &line.samples[1..] {
+            nodes.push(node(sample, Some(parent)));
+            parent = nodes.len() - 1;
+        }
+        node_of_hub[line.to] = parent;
+    }
+    nodes
+}
+
+/// Merges what lies at one place, resamples, and describes the result.
+fn finish(
+    nodes: &[Node],
+    kind: Resample,
+    params: &Params,
+    mut ledger: Ledger,
+    mut report: Report,
+) -> Result<Built, Error> {
+    let dense = Tree::new(&merge::merge_near(nodes, &mut ledger))?;
+    let tree = Tree::new(&resample::resample(&dense, kind, params))?;
+    summary::describe(&tree, &ledger, &mut report);
+    Ok(Built { tree, ledger, report })
+}

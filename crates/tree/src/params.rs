@@ -1,0 +1,168 @@
+//! Settings of the tree stage.
+
+use espalier_model::diagnose::ParamError;
+use serde::{Deserialize, Serialize};
+
+/// What to do with a skeleton in several pieces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Components {
+    /// Keep the longest, drop the others; each drop is in the ledger.
+    #[default]
+    Largest,
+    /// Refuse the skeleton.
+    Refuse,
+}
+
+/// What to do with loops.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Loops {
+    /// Open each at its thinnest place; each cut is in the ledger.
+    #[default]
+    Cut,
+    /// Refuse the skeleton.
+    Refuse,
+}
+
+/// Where the tree is rooted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Root {
+    /// At the tip of the largest calibre.
+    #[default]
+    ThickestTip,
+    /// At the most superior tip: the trachea of an airway.
+    Superior,
+}
+
+/// What to do with the free ends of a skeleton.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Tips {
+    /// Lead each along its tangent to the end of the mask.
+    #[default]
+    Extend,
+    /// Leave them where thinning ended.
+    Keep,
+}
+
+/// How densely nodes stand on a branch.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Resample {
+    /// `shape` for masks, `none` for traced trees, whose nodes are the annotator's.
+    #[default]
+    Auto,
+    /// Where the shape changes: Douglas–Peucker with `tolerance`.
+    Shape,
+    /// Every `step_mm`.
+    Step,
+    /// As they come.
+    None,
+}
+
+/// What to do with several roots of a traced structure.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Roots {
+    /// Keep the tree of the greatest length, drop the others; each drop is in the ledger.
+    #[default]
+    Largest,
+    /// Join each further root to the nearest node of the tree of the greatest length by a straight edge.
+    Join,
+    /// Refuse the structure.
+    Refuse,
+}
+
+/// What to do with nodes of a traced structure that have radius 0, which means "not measured".
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MissingRadii {
+    /// The mean of the nearest measured radii above and below; 0 where there is none at all.
+    #[default]
+    Neighbours,
+    /// Leave them 0.
+    Keep,
+}
+
+/// Settings of the tree stage.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Params {
+    /// What to do with a skeleton in several pieces. Default `largest`: islands are the common fault of masks.
+    pub components: Components,
+    /// What to do with loops. Default `cut`: real masks are never trees.
+    pub loops: Loops,
+    /// Where the tree is rooted. Default `thickest-tip`; `superior` for airways.
+    pub root: Root,
+    /// A point in RAS+ mm; if given, the tip nearest to it is the root, whatever `root` says. Default none.
+    pub root_mm: Option<[f64; 3]>,
+    /// A terminal branch shorter than this multiple of the radius at its fork is a spur. Dimensionless, 0 to 10;
+    /// 0 prunes none. Default 1.5: on phantoms it kept 98–100 % of the tips at 98–100 % precision, where one
+    /// length in mm for the whole tree destroys half of a small one. Larger prunes more.
+    pub prune_factor: f64,
+    /// A terminal branch shorter than this is a spur, whatever its fork's radius. In mm, at least 0. Default 0.
+    /// Larger prunes more.
+    pub prune_min_mm: f64,
+    /// Standard deviation of the Gaussian that smooths branches, in voxels along the branch (its largest
+    /// projected spacing). 0 to 4, 0 smooths nothing. Default 1, enough to take the voxel staircase away.
+    /// Larger cuts corners.
+    pub smooth_voxels: f64,
+    /// What to do with free ends. Default `extend`: thinning leaves them 0.6–1.2 voxels short.
+    pub tips: Tips,
+    /// How densely nodes stand on a branch. Default `auto`.
+    pub resample: Resample,
+    /// With `resample = "shape"`: how far the tree may leave the smoothed centreline, and its radius the
+    /// smoothed radius, as a share of the local radius. Above 0, at most 1. Default 0.1. Larger gives fewer nodes.
+    pub tolerance: f64,
+    /// With `resample = "step"`: the distance between nodes, in mm, above 0. Default 2. Larger gives fewer nodes.
+    pub step_mm: f64,
+    /// What to do with several roots of a traced structure. Default `largest`.
+    pub roots: Roots,
+    /// What to do with nodes of a traced structure that have radius 0. Default `neighbours`.
+    pub missing_radii: MissingRadii,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            components: Components::default(),
+            loops: Loops::default(),
+            root: Root::default(),
+            root_mm: None,
+            prune_factor: 1.5,
+            prune_min_mm: 0.0,
+            smooth_voxels: 1.0,
+            tips: Tips::default(),
+            resample: Resample::default(),
+            tolerance: 0.1,
+            step_mm: 2.0,
+            roots: Roots::default(),
+            missing_radii: MissingRadii::default(),
+        }
+    }
+}
+
+impl Params {
+    /// Checks all ranges.
+    ///
+    /// # Errors
+    /// The first parameter outside its range.
+    pub fn validate(&self) -> Result<(), ParamError> {
+        let in_range = |key, value: f64, low: f64, high: f64| {
+            ParamError::check(
+                key,
+                (low..=high).contains(&value),
+                format!("must be between {low} and {high}, is {value}"),
+            )
+        };
+        in_range("prune_factor", self.prune_factor, 0.0, 10.0)?;
+        in_range("prune_min_mm", self.prune_min_mm, 0.0, 1e6)?;
+        in_range("smooth_voxels", self.smooth_voxels, 0.0, 4.0)?;
+        in_range("tolerance", self.tolerance, 1e-6, 1.0)?;
+        in_range("step_mm", self.step_mm, 1e-9, 1e9)?;
+        let is_point = self.root_mm.is_none_or(|point| point.iter().all(|c| c.is_finite()));
+        ParamError::check("root_mm", is_point, format!("must be three finite numbers, is {:?}", self.root_mm))
+    }
+}

@@ -1,0 +1,71 @@
+//! Spurs: short terminal branches that thinning grew on bumps of the surface.
+//!
+//! **Input** a graph without cycles. **Output** the same without spurs; a ledger entry for each.
+//! **Steps** 1. A terminal branch is a spur if it is shorter than `prune_factor` × the radius at its fork, or than
+//! `prune_min_mm`. 2. Take the shortest spur away. 3. If two branches are left at its fork, they are one branch now,
+//! with their joint length. 4. Again, until there is no spur.
+//! **Guarantees** at least two branches stay at every fork that was one; protected tips stay; the result does not
+//! depend on the order of the voxels but for exact ties, which go to the lower hub index.
+//! **Cost** O(B log B) in branches.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use espalier_model::{Ledger, LedgerEntry, LedgerKind};
+
+use crate::living::Living;
+use crate::params::Params;
+
+/// Prunes all spurs whose tips are not protected; returns how many there were.
+pub(crate) fn prune(
+    living: &mut Living<'_>,
+    is_protected: &[bool],
+    params: &Params,
+    ledger: &mut Ledger,
+) -> usize {
+    let mut n_pruned = 0;
+    // Lengths are at least 0, so their bits order as they do.
+    let mut shortest_first = BinaryHeap::new();
+    for tip in living.tips() {
+        if let Some((run, _)) = living.run_at_tip(tip) {
+            shortest_first.push(Reverse((run.length_mm.to_bits(), tip)));
+        }
+    }
+    while let Some(Reverse((length_bits, tip))) = shortest_first.pop() {
+        if living.degree(tip) != 1 || is_protected[tip] {
+            continue;
+        }
+        let Some((run, fork)) = living.run_at_tip(tip) else { continue };
+        let is_outdated = run.length_mm.to_bits() != length_bits;
+        if is_outdated || living.degree(fork) < 3 {
+            continue;
+        }
+        let fork_radius_mm = living.graph.hubs[fork].sample.radius_mm;
+        let limit_mm = (params.prune_factor * fork_radius_mm).max(params.prune_min_mm);
+        if run.length_mm >= limit_mm {
+            continue;
+        }
+
+        let sample = living.graph.hubs[tip].sample;
+        ledger.0.push(LedgerEntry {
+            kind: LedgerKind::SpurPruned,
+            position_mm: sample.position_mm,
+            radius_mm: sample.radius_mm,
+            length_mm: run.length_mm,
+            reason: format!(
+                "terminal branch of {:.3} mm at a fork of radius {fork_radius_mm:.3} mm; the limit there is {limit_mm:.3} mm",
+                run.length_mm
+            ),
+        });
+        living.remove_at_tip(tip);
+        n_pruned += 1;
+        // If the fork dissolved, branches that ended there are longer now: look at them again.
+        if living.degree(fork) == 2 {
+            let Some(run) = living.run_through(fork) else { continue };
+            for end in run.ends.into_iter().filter(|&end| living.degree(end) == 1) {
+                shortest_first.push(Reverse((run.length_mm.to_bits(), end)));
+            }
+        }
+    }
+    n_pruned
+}

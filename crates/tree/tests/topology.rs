@@ -1,0 +1,227 @@
+//! Graph, components, loops, spurs and roots on hand-made skeletons.
+
+mod common;
+
+use common::{Places, inputs, run, tree_of};
+use espalier_model::diagnose::Class;
+use espalier_model::{Diagnose, InscribedSpheres, LedgerKind, Mask, Skeleton};
+use espalier_tree::{Components, Error, Loops, Params, Root, Tips, build};
+use glam::DVec3;
+
+const SHAPE: [usize; 3] = [60, 60, 9];
+
+fn at(x: f64, y: f64, z: f64) -> DVec3 {
+    DVec3::new(x, y, z)
+}
+
+/// A Y in the plane z = 4: stem up the y axis, arms to both sides; radii fall outwards.
+fn y_shape() -> Places {
+    let mut places = run([30, 5, 4], [30, 30, 4], 3.0);
+    places.extend(run([30, 30, 4], [10, 50, 4], 2.0));
+    places.extend(run([30, 30, 4], [50, 50, 4], 2.0));
+    places
+}
+
+#[test]
+fn one_and_two_voxels_are_trees() {
+    let one = tree_of(&vec![([3, 3, 3], 1.0)], SHAPE, &Params::default()).expect("a tree");
+    assert_eq!((one.tree.n_nodes(), one.tree.n_tips()), (1, 0));
+    assert_eq!(one.tree.position_mm(0), at(3.0, 3.0, 3.0));
+
+    let two = tree_of(&run([3, 3, 3], [4, 3, 3], 0.0), SHAPE, &Params::default()).expect("a tree");
+    assert_eq!((two.tree.n_nodes(), two.tree.n_tips()), (2, 1));
+}
+
+#[test]
+fn line_keeps_its_length_or_grows_to_the_end_of_the_mask() {
+    let places = run([5, 30, 4], [45, 30, 4], 3.0);
+    let keep = Params { tips: Tips::Keep, ..Params::default() };
+    let kept = tree_of(&places, SHAPE, &keep).expect("a tree").tree;
+    assert_eq!(kept.n_nodes(), 2, "a straight line needs two nodes");
+    assert!((kept.length_mm() - 40.0).abs() < 1e-9);
+
+    // The spheres about both ends reach 3 voxel centres further.
+    let grown = tree_of(&places, SHAPE, &Params::default()).expect("a tree");
+    assert!((grown.tree.length_mm() - 46.0).abs() < 0.01, "{}", grown.tree.length_mm());
+    assert_eq!(grown.ledger.n_of(LedgerKind::TipExtended), 2);
+    assert_eq!(grown.report.get("tips_extended"), Some(2.0));
+}
+
+#[test]
+fn y_has_one_fork_at_the_junction() {
+    let built = tree_of(&y_shape(), SHAPE, &Params::default()).expect("a tree");
+    let tree = &built.tree;
+    assert_eq!((tree.n_tips(), tree.branches().list().len()), (2, 3));
+    let fork = (0..tree.n_nodes()).find(|&node| tree.children(node).len() == 2).expect("a fork");
+    assert!(tree.position_mm(fork).distance(at(30.0, 30.0, 4.0)) < 1.0, "{}", tree.position_mm(fork));
+    assert!(tree.position_mm(0).y < 6.0, "the root is the thickest tip, the foot");
+    assert_eq!(built.report.get("generations"), Some(2.0));
+    assert!(built.report.get("root_runner_up_y_mm").expect("a runner-up") > 45.0);
+}
+
+#[test]
+fn roots_by_policy() {
+    let by_point = Params { root_mm: Some([12.0, 48.0, 0.0]), ..Params::default() };
+    let tree = tree_of(&y_shape(), SHAPE, &by_point).expect("a tree").tree;
+    assert!(tree.position_mm(0).distance(at(10.0, 50.0, 4.0)) < 3.0, "{}", tree.position_mm(0));
+
+    let mut leaning = run([5, 5, 1], [30, 30, 4], 2.0);
+    leaning.extend(run([30, 30, 4], [50, 30, 7], 1.0));
+    leaning.extend(run([30, 30, 4], [30, 55, 4], 3.0));
+    let superior = Params { root: Root::Superior, ..Params::default() };
+    let tree = tree_of(&leaning, SHAPE, &superior).expect("a tree").tree;
+    assert!(tree.position_mm(0).distance(at(50.0, 30.0, 7.0)) < 3.0, "{}", tree.position_mm(0));
+    let tree = tree_of(&leaning, SHAPE, &Params::default()).expect("a tree").tree;
+    assert!(tree.position_mm(0).distance(at(30.0, 55.0, 4.0)) < 5.0, "{}", tree.position_mm(0));
+}
+
+#[test]
+fn loop_is_cut_at_its_thinnest_place() {
+    // A square ring on a stem, thinnest at (40, 25).
+    let mut places = run([30, 5, 4], [30, 20, 4], 2.0);
+    places.extend(run([30, 20, 4], [20, 30, 4], 2.0));
+    places.extend(run([20, 30, 4], [30, 40, 4], 2.0));
+    places.extend(run([30, 20, 4], [40, 30, 4], 2.0));
+    places.extend(run([40, 30, 4], [30, 40, 4], 2.0));
+    places.extend(run([30, 40, 4], [30, 55, 4], 2.0));
+    for place in &mut places {
+        if place.0 == [37, 27, 4] || place.0 == [38, 28, 4] {
+            place.1 = 1.0;
+        }
+    }
+    let built = tree_of(&places, SHAPE, &Params::default()).expect("a tree");
+    let cuts: Vec<_> = built.ledger.0.iter().filter(|e| e.kind == LedgerKind::LoopCut).collect();
+    assert_eq!(cuts.len(), 1);
+    assert!(cuts[0].position_mm.distance(at(37.5, 27.5, 4.0)) < 1e-9, "{:?}", cuts[0]);
+    assert!((cuts[0].radius_mm - 1.0).abs() < 1e-9);
+    // Both stubs are longer than spurs: stem, two arms that end at the cut or go on.
+    assert_eq!(built.tree.n_tips(), 3);
+
+    let refuse = Params { loops: Loops::Refuse, ..Params::default() };
+    let error = tree_of(&places, SHAPE, &refuse).expect_err("a loop");
+    assert!(matches!(error, Error::Loops { n_loops: 1, .. }), "{error}");
+    assert_eq!(error.class(), Class::Topology);
+}
+
+#[test]
+fn ring_without_any_junction_opens() {
+    let mut ring = run([20, 10, 4], [30, 20, 4], 1.0);
+    ring.extend(run([30, 20, 4], [20, 30, 4], 1.0));
+    ring.extend(run([20, 30, 4], [10, 20, 4], 1.0));
+    ring.extend(run([10, 20, 4], [20, 10, 4], 1.0));
+    let built = tree_of(&ring, SHAPE, &Params::default()).expect("a tree");
+    assert_eq!(built.ledger.n_of(LedgerKind::LoopCut), 1);
+    assert_eq!((built.tree.n_tips(), built.tree.branches().list().len()), (1, 1));
+    assert!(built.tree.length_mm() > 36.0 * std::f64::consts::SQRT_2);
+}
+
+#[test]
+fn touching_voxels_are_no_loop() {
+    // A 2 × 2 × 2 block in the middle of a line, and a triangle at its end.
+    let mut places = run([5, 30, 4], [40, 30, 4], 1.0);
+    for voxel in [[20, 31, 4], [21, 31, 4], [20, 30, 5], [21, 30, 5], [20, 31, 5], [21, 31, 5], [40, 31, 4]] {
+        places.push((voxel, 1.0));
+    }
+    let built = tree_of(&places, SHAPE, &Params::default()).expect("a tree");
+    assert_eq!(built.ledger.n_of(LedgerKind::LoopCut), 0);
+    assert_eq!((built.tree.n_tips(), built.tree.branches().list().len()), (1, 1));
+}
+
+#[test]
+fn spurs_go_and_teeth_stay() {
+    // A thick spine; teeth of 4 voxels are spurs there (limit 1.5 × 4 mm), teeth of 12 are branches.
+    let mut places = run([5, 30, 4], [55, 30, 4], 4.0);
+    for (i, x) in (10..50).step_by(6).enumerate() {
+        let tip = if i % 2 == 0 { 34 } else { 42 };
+        places.extend(run([x, 31, 4], [x, tip, 4], 1.0));
+    }
+    let built = tree_of(&places, SHAPE, &Params::default()).expect("a tree");
+    assert_eq!(built.ledger.n_of(LedgerKind::SpurPruned), 4);
+    assert_eq!(built.tree.n_tips(), 3 + 1);
+    let none = Params { prune_factor: 0.0, ..Params::default() };
+    assert_eq!(tree_of(&places, SHAPE, &none).expect("a tree").tree.n_tips(), 7 + 1);
+    let all = Params { prune_min_mm: 20.0, ..Params::default() };
+    assert_eq!(tree_of(&places, SHAPE, &all).expect("a tree").tree.n_tips(), 1);
+}
+
+#[test]
+fn pruning_looks_again_after_a_fork_dissolves() {
+    // A twig of 8 voxels with a spur of 2 halfway: each half alone would be shorter than the limit of 6.
+    let mut places = run([5, 30, 4], [55, 30, 4], 4.0);
+    places.extend(run([30, 31, 4], [30, 39, 4], 2.5));
+    places.extend(run([31, 35, 4], [32, 36, 4], 0.5));
+    let built = tree_of(&places, SHAPE, &Params::default()).expect("a tree");
+    assert_eq!(built.ledger.n_of(LedgerKind::SpurPruned), 1);
+    assert_eq!(built.tree.n_tips(), 2);
+}
+
+#[test]
+fn trunk_cut_off_by_the_border_is_no_spur() {
+    let mut places = run([30, 0, 4], [30, 4, 4], 4.0);
+    places.extend(run([30, 4, 4], [10, 24, 4], 2.5));
+    places.extend(run([30, 4, 4], [50, 24, 4], 2.5));
+    let (mask, skeleton, mut spheres) = inputs(&places, SHAPE);
+    let pruned = build(&mask, &skeleton, &spheres, &Params::default()).expect("a tree");
+    assert_eq!(pruned.tree.branches().list().len(), 1, "far from the border it is a spur");
+    for (sphere, voxel) in spheres.0.iter_mut().zip(skeleton.voxels()) {
+        sphere.is_cut = voxel[1] <= 3;
+    }
+    let kept = build(&mask, &skeleton, &spheres, &Params::default()).expect("a tree");
+    assert_eq!(kept.tree.branches().list().len(), 3);
+    assert!(kept.tree.position_mm(0).y < 1.0);
+}
+
+#[test]
+fn islands_are_dropped_or_refused() {
+    let mut places = y_shape();
+    places.extend(run([2, 2, 1], [8, 2, 1], 5.0));
+    places.push(([55, 2, 1], 1.0));
+    let built = tree_of(&places, SHAPE, &Params::default()).expect("a tree");
+    let dropped: Vec<_> = built.ledger.0.iter().filter(|e| e.kind == LedgerKind::ComponentDropped).collect();
+    assert_eq!(dropped.len(), 2);
+    assert!((dropped[0].length_mm - 6.0).abs() < 1e-9 && dropped[1].length_mm == 0.0);
+    assert_eq!(built.tree.n_tips(), 2);
+
+    let refuse = Params { components: Components::Refuse, ..Params::default() };
+    let error = tree_of(&places, SHAPE, &refuse).expect_err("islands");
+    assert!(matches!(error, Error::Components { n_components: 3, .. }), "{error}");
+    assert_eq!(error.class(), Class::Topology);
+}
+
+#[test]
+fn input_that_does_not_belong_together_is_refused() {
+    let (mask, skeleton, spheres) = inputs(&y_shape(), SHAPE);
+    let params = Params::default();
+    let nothing = Skeleton::new(skeleton.grid().clone(), Vec::new());
+    let error = build(&mask, &nothing, &InscribedSpheres::default(), &params).expect_err("empty");
+    assert!(matches!(error, Error::EmptySkeleton { .. }) && error.class() == Class::Input, "{error}");
+
+    let fewer = InscribedSpheres(spheres.0[1..].to_vec());
+    let error = build(&mask, &skeleton, &fewer, &params).expect_err("one sphere short");
+    assert!(matches!(error, Error::SphereCount { .. }), "{error}");
+
+    let elsewhere = Mask::empty(inputs(&y_shape(), [61, 60, 9]).0.grid().clone());
+    let error = build(&elsewhere, &skeleton, &spheres, &params).expect_err("another grid");
+    assert!(matches!(error, Error::Grids { .. }), "{error}");
+
+    for (center_mm, radius_mm) in
+        [(at(f64::NAN, 0.0, 0.0), 1.0), (at(0.0, 0.0, 0.0), -1.0), (at(1e9, 0.0, 0.0), 1.0)]
+    {
+        let mut bad = spheres.clone();
+        bad.0[7].center_mm = center_mm;
+        bad.0[7].radius_mm = radius_mm;
+        let error = build(&mask, &skeleton, &bad, &params).expect_err("a bad sphere");
+        assert!(matches!(error, Error::BadSphere { voxel: 7, .. }), "{error}");
+    }
+    for (key, params) in [
+        ("prune_factor", Params { prune_factor: -1.0, ..Params::default() }),
+        ("smooth_voxels", Params { smooth_voxels: f64::NAN, ..Params::default() }),
+        ("tolerance", Params { tolerance: 0.0, ..Params::default() }),
+        ("step_mm", Params { step_mm: -0.0, ..Params::default() }),
+        ("root_mm", Params { root_mm: Some([0.0, f64::NAN, 0.0]), ..Params::default() }),
+    ] {
+        let error = build(&mask, &skeleton, &spheres, &params).expect_err(key);
+        assert!(matches!(&error, Error::Param(e) if e.key == key), "{error}");
+        assert_eq!(error.class(), Class::Usage);
+    }
+}
