@@ -1,1 +1,93 @@
-//! To be written.
+//! Trees laid flat without crossings.
+//!
+//! | step | file | what |
+//! |--:|---|---|
+//! | 1 | `targets`, `siblings` | target angles, lengths and headings from the tree and its views |
+//! | 2 | `problem`, `ratio` | the frozen problem; equation 3 between angles and ratios |
+//! | 3 | `layout/…` | the methods: `projection`, `radial`, `cone`, `pso` (with `start`) |
+//! | 4 | `batch`, `crossing` | the swarm's energy, many particles at once, and its strict crossing count |
+//! | 5 | `pose` | one rigid motion of the whole; rounding to what is written |
+//! | 6 | `certify`, `overlap` | the exact certificate; overlaps of the drawn tubes |
+//! | 7 | `energy`, `losses`, `distances` | the one energy and all losses, for every method alike |
+//! | 8 | `select` | the best certified layout, and the table of all |
+//!
+//! **Cost** Targets, radial, cone, pose and energy are linear in N. The certificate sorts and sweeps, N log N on
+//! layouts that fill their box. Distances take a fixed 1.1 million pairs. The swarm takes particles · iterations
+//! evaluations, of which most end at the first lines of `batch`; the crossing check is the rest.
+//!
+//! **Source** [Hu2022] sections 3.2 and 5.1.
+
+mod batch;
+mod certify;
+mod crossing;
+mod distances;
+mod energy;
+mod error;
+mod layout;
+mod losses;
+mod overlap;
+mod params;
+mod place;
+mod pose;
+mod problem;
+mod ratio;
+mod select;
+mod siblings;
+mod targets;
+
+use espalier_model::{Embedding, Report, Tree, ViewHierarchy};
+
+pub use error::Error;
+pub use params::{CrossingWeight, Freedom, Method, Params, Pull, Start, TargetMode};
+
+/// How far the swarm is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// Iterations done; 0 is the start.
+    pub done: u64,
+    /// Iterations there will be at most.
+    pub total: u64,
+    /// Evaluations so far.
+    pub evaluations: u64,
+    /// The best energy so far.
+    pub energy: f64,
+    /// The crossings of that best.
+    pub crossings: usize,
+}
+
+/// A tree laid flat, and what was done.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Embedded {
+    /// The layout with its certificate.
+    pub embedding: Embedding,
+    /// Counts and warnings.
+    pub report: Report,
+}
+
+/// Lays a tree flat without crossings.
+///
+/// Runs the methods asked for, scores them by one energy against one set of targets, and returns the best
+/// certified layout (see [`Params::method`]). `progress` is called once per iteration of the swarm. Parallel in
+/// the current thread pool; the result depends on `tree`, `views`, `params` and `seed` only.
+///
+/// # Errors
+/// A parameter out of range, views of another tree, a tree too small or too large for exact arithmetic, a swarm
+/// beyond its memory, or [`Error::Uncertified`] where no layout is free of crossings after rounding.
+pub fn embed(
+    tree: &Tree,
+    views: &ViewHierarchy,
+    params: &Params,
+    seed: u64,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Embedded, Error> {
+    params.validate()?;
+    let length_mm = tree.length_mm();
+    if tree.n_nodes() > 1 && !(1e-60..=1e60).contains(&length_mm) {
+        return Err(Error::Scale { length_mm });
+    }
+    let branches = tree.branches();
+    let targets = targets::targets(tree, &branches, views, params.targets)?;
+    let problem = problem::Problem::new(tree, branches, targets, params);
+    let layouts = select::run_methods(&problem, views, params, seed, progress)?;
+    select::select(&problem, layouts, params, seed)
+}

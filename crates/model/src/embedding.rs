@@ -1,5 +1,7 @@
 //! A tree laid flat.
 
+mod file;
+
 use glam::DVec2;
 
 /// Where target angles come from (section 3.2.1 of [Hu2022]).
@@ -110,7 +112,7 @@ pub enum Termination {
     /// Nothing to optimise, or a constructive method.
     #[default]
     Constructed,
-    /// The energy is zero: proven optimal for its targets.
+    /// No length, angle or crossing is lost: proven optimal for its targets.
     Optimal,
     /// The work allowed was done.
     BudgetSpent,
@@ -178,7 +180,7 @@ pub struct Embedding {
     pub pose: Pose,
     /// Why it ended.
     pub termination: Termination,
-    /// The convergence curve of the optimiser that made it; empty for constructive methods.
+    /// The convergence curve of the optimiser that ran, whether or not its layout won; empty if none did.
     pub trace: Vec<TracePoint>,
     /// All methods that ran, scored alike, this one among them.
     pub methods: Vec<MethodRow>,

@@ -1,0 +1,106 @@
+//! Why a tree cannot be laid flat.
+
+use espalier_model::Diagnose;
+use espalier_model::diagnose::{Class, ParamError};
+use thiserror::Error;
+
+/// Why a tree cannot be laid flat.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A parameter outside its range.
+    #[error("embed: {0}")]
+    Param(#[from] ParamError),
+    /// The views were made for another tree.
+    #[error("the views do not fit the tree: {n_found} {what}, expected {n_expected}")]
+    Views {
+        /// What was counted: planes of branches or of forks.
+        what: &'static str,
+        /// How many the views have.
+        n_found: usize,
+        /// How many the tree needs.
+        n_expected: usize,
+    },
+    /// A tree so small or so large that coordinates would leave the range of exact arithmetic.
+    #[error("the tree is {length_mm:e} mm long; only lengths from 1e-60 to 1e60 mm can be laid flat")]
+    Scale {
+        /// The sum of all edge lengths, in mm.
+        length_mm: f64,
+    },
+    /// A swarm that needs more memory than it may have.
+    #[error(
+        "a swarm of {particles} particles with {dims} ratios each needs {needed_mib} MiB, allowed are {limit_mib} MiB"
+    )]
+    Memory {
+        /// The particles.
+        particles: u32,
+        /// The ratios of one particle.
+        dims: usize,
+        /// What they need, in MiB.
+        needed_mib: u64,
+        /// What is allowed, in MiB.
+        limit_mib: u64,
+    },
+    /// No layout passed the exact check of its rounded coordinates.
+    #[error(
+        "no layout is free of crossings: the best has {crossings}, the first between edges {first} and {second}"
+    )]
+    Uncertified {
+        /// The crossings of the layout with the fewest.
+        crossings: usize,
+        /// An edge of its first crossing, by its lower node.
+        first: usize,
+        /// The other edge of it.
+        second: usize,
+    },
+    /// The result would be worse than a baseline: a bug.
+    #[error("the result of energy {energy} is worse than {method} of energy {incumbent}")]
+    Worse {
+        /// The energy of the result.
+        energy: f64,
+        /// The better method.
+        method: String,
+        /// Its energy.
+        incumbent: f64,
+    },
+}
+
+impl Diagnose for Error {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::Param(error) => error.code(),
+            Self::Views { .. } => "E-EMBED-VIEWS",
+            Self::Scale { .. } => "E-EMBED-SCALE",
+            Self::Memory { .. } => "E-EMBED-MEMORY",
+            Self::Uncertified { .. } => "E-EMBED-UNCERTIFIED",
+            Self::Worse { .. } => "E-EMBED-WORSE",
+        }
+    }
+
+    fn class(&self) -> Class {
+        match self {
+            Self::Param(error) => error.class(),
+            Self::Views { .. } | Self::Scale { .. } => Class::Input,
+            Self::Memory { .. } => Class::Limit,
+            Self::Uncertified { .. } => Class::Uncertified,
+            Self::Worse { .. } => Class::Internal,
+        }
+    }
+
+    fn hint(&self) -> String {
+        match self {
+            Self::Param(error) => error.hint(),
+            Self::Views { .. } => "run the views stage again on this very tree".to_owned(),
+            Self::Scale { .. } => "check the unit of the input".to_owned(),
+            Self::Memory { .. } => {
+                "lower `particles`, choose `freedom = \"s\"` or raise `memory_mib`".to_owned()
+            }
+            Self::Uncertified { .. } => {
+                "edge lengths that span more than ten decades cannot be told apart in twelve digits: merge \
+                 the shortest edges (tree resampling)"
+                    .to_owned()
+            }
+            Self::Worse { .. } => "this is a bug of espalier: please report it with the input".to_owned(),
+        }
+    }
+}

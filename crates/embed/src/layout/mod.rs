@@ -1,0 +1,36 @@
+//! The layout methods, one file each: from a frozen problem to positions.
+//!
+//! | file | method | crossings |
+//! |---|---|---|
+//! | `projection` | the best global view as it is | as many as there are |
+//! | `radial` | equal angle per tip | none |
+//! | `cone` | nested convex cones that keep sides | none, for any lengths |
+//! | `pso` | the paper's particle swarm, Algorithm 1 | none, or the incumbent wins |
+
+pub(crate) mod cone;
+pub(crate) mod projection;
+pub(crate) mod pso;
+pub(crate) mod radial;
+pub(crate) mod start;
+
+use espalier_model::TracePoint;
+use glam::DVec2;
+
+/// A layout as a method leaves it, before pose and rounding.
+pub(crate) struct Layout {
+    /// The method's name, with its size where that matters.
+    pub(crate) name: String,
+    /// Plane mm, any rigid motion.
+    pub(crate) positions: Vec<DVec2>,
+    /// Evaluations of the energy that it took.
+    pub(crate) evaluations: u64,
+    /// The convergence curve; empty for constructive methods.
+    pub(crate) trace: Vec<TracePoint>,
+}
+
+impl Layout {
+    /// The layout of a method that does not search.
+    pub(crate) fn constructed(name: &str, positions: Vec<DVec2>) -> Self {
+        Self { name: name.to_owned(), positions, evaluations: 0, trace: Vec::new() }
+    }
+}

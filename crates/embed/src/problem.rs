@@ -1,0 +1,144 @@
+//! The frozen problem: a tree, its targets and weights as flat arrays, the same for every method.
+//!
+//! **Input** tree, targets, params. **Output** `Problem`. **Notation** N nodes, M segments (branches), L the
+//! tree's length; arrays have one entry per node, that of the root is 0.
+//! **Guarantees** with `w_crossing = "auto"` one crossing costs more than any layout without crossings: length
+//! ratios are in (−1, 1], angle ratios in [−1, 2], headings at most π off, so E ≤ M (w_l + 4 w_a + π² w_g).
+//! **Source** [Hu2022] section 3.2.2.
+//! **Differs from the source** its largest angle loss is 1, because its layouts never change the side of a turn;
+//! baselines do, and shall be scored by the same energy.
+
+use std::f64::consts::PI;
+
+use espalier_geom::math;
+use espalier_model::{Branches, Targets, Tree};
+
+use crate::params::{CrossingWeight, Params};
+use crate::ratio;
+
+/// A tree with targets and weights.
+pub(crate) struct Problem<'a> {
+    /// The tree.
+    pub(crate) tree: &'a Tree,
+    /// Its branches: the paper's segments.
+    pub(crate) branches: Branches,
+    /// What to aim at.
+    pub(crate) targets: Targets,
+    /// The parent of each node; the root is its own.
+    pub(crate) parent: Vec<u32>,
+    /// The branch of each node; 0 for the root, which has none.
+    pub(crate) branch: Vec<u32>,
+    /// |θ − π| of each node.
+    pub(crate) bend: Vec<f64>,
+    /// −1 where the target turns right, 1 where left.
+    pub(crate) side: Vec<f64>,
+    /// What r_l² costs: w_l over the number of edges of the branch.
+    pub(crate) length_cost: Vec<f64>,
+    /// What r_a² costs: w_a over the number of angles of the branch; 0 for children of the root.
+    pub(crate) angle_cost: Vec<f64>,
+    /// What (h − H)² costs: w_g (M/L) conf² l.
+    pub(crate) placement_cost: Vec<f64>,
+    /// cos H and sin H, each times the placement cost, to find the best rotation.
+    pub(crate) placement_cos: Vec<f64>,
+    /// As `placement_cos`, of the sine.
+    pub(crate) placement_sin: Vec<f64>,
+    /// w_X.
+    pub(crate) crossing_weight: f64,
+    /// The typical edge length, in mm: the scale of the swarm's tolerance.
+    pub(crate) scale_mm: f64,
+}
+
+impl<'a> Problem<'a> {
+    pub(crate) fn new(tree: &'a Tree, branches: Branches, targets: Targets, params: &Params) -> Self {
+        let n_nodes = tree.n_nodes();
+        let parent: Vec<u32> = (0..n_nodes).map(|node| tree.parent(node).unwrap_or(0) as u32).collect();
+        let branch = (0..n_nodes).map(|node| branches.of_node(node).unwrap_or(0) as u32).collect();
+        let n_segments = branches.list().len() as f64;
+        let length_mm = tree.length_mm();
+
+        let (mut length_cost, mut angle_cost) = (vec![0.0; n_nodes], vec![0.0; n_nodes]);
+        for segment in branches.list() {
+            let n_angles = segment.nodes.clone().filter(|&node| parent[node] != 0).count();
+            for node in segment.nodes.clone() {
+                length_cost[node] = params.w_length / segment.nodes.len() as f64;
+                if parent[node] != 0 {
+                    angle_cost[node] = params.w_angle / n_angles as f64;
+                }
+            }
+        }
+
+        let mut placement_cost = vec![0.0; n_nodes];
+        let (mut placement_cos, mut placement_sin) = (placement_cost.clone(), placement_cost.clone());
+        for node in 1..n_nodes {
+            let confidence = targets.confidence[node];
+            let cost = params.w_placement * n_segments / length_mm
+                * (confidence * confidence * targets.length_mm[node]);
+            let (sin, cos) = math::sin_cos(targets.heading_rad[node]);
+            placement_cost[node] = cost;
+            (placement_cos[node], placement_sin[node]) = (cost * cos, cost * sin);
+        }
+
+        let crossing_weight = match params.w_crossing {
+            CrossingWeight::Fixed(weight) => weight,
+            CrossingWeight::Auto => {
+                let largest = params.w_length + 4.0 * params.w_angle + PI * PI * params.w_placement;
+                // A tree without weights still has crossings to avoid.
+                1.5 * (n_segments * largest).max(1.0)
+            }
+        };
+        let bend = targets.angle_rad.iter().map(|&angle| zero_if_nan(ratio::target_bend(angle))).collect();
+        let side = targets.angle_rad.iter().map(|&angle| ratio::side_sign(angle)).collect();
+        let scale_mm = median_length(&targets.length_mm[1..]);
+        Self {
+            tree,
+            branches,
+            targets,
+            parent,
+            branch,
+            bend,
+            side,
+            length_cost,
+            angle_cost,
+            placement_cost,
+            placement_cos,
+            placement_sin,
+            crossing_weight,
+            scale_mm,
+        }
+    }
+
+    /// N.
+    pub(crate) fn n_nodes(&self) -> usize {
+        self.parent.len()
+    }
+
+    /// The number of tips below each node, itself if it is one.
+    pub(crate) fn n_tips_below(&self) -> Vec<u32> {
+        let mut n_tips = vec![0_u32; self.n_nodes()];
+        for node in (0..self.n_nodes()).rev() {
+            n_tips[node] = n_tips[node].max(1);
+            if node > 0 {
+                n_tips[self.parent[node] as usize] += n_tips[node];
+            }
+        }
+        n_tips
+    }
+
+    /// The children of a node in the counter-clockwise order of their target angles.
+    pub(crate) fn children_by_target(&self, node: usize) -> Vec<usize> {
+        let mut children = self.tree.children(node).to_vec();
+        let angle = &self.targets.angle_rad;
+        children.sort_by(|&a, &b| angle[a].total_cmp(&angle[b]).then(a.cmp(&b)));
+        children
+    }
+}
+
+fn zero_if_nan(value: f64) -> f64 {
+    if value.is_nan() { 0.0 } else { value }
+}
+
+fn median_length(lengths: &[f64]) -> f64 {
+    let mut sorted = lengths.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}

@@ -1,0 +1,190 @@
+//! Running the methods, judging them alike, and taking the best.
+//!
+//! **Input** the problem, params, seed. **Output** `Embedded`.
+//! **Steps** 1. Run the methods. 2. Each layout gets its pose and is rounded. 3. Exact certificate, energy, losses.
+//! 4. The winner: for `pso` the certified layout of least energy, whoever made it; for a constructive method that
+//! method, or if it has crossings the certified layout of least energy.
+//! **Guarantees** the result is certified, and under `pso` never worse than any certified layout that ran.
+//! **Cost** dominated by the swarm.
+
+use espalier_model::{
+    Certificate, Embedding, Losses, MethodRow, Report, TargetKind, Termination, TracePoint, ViewHierarchy,
+};
+use rayon::prelude::*;
+
+use crate::distances::SpaceDistances;
+use crate::energy::{self, Scored};
+use crate::error::Error;
+use crate::layout::{Layout, cone, projection, pso, radial};
+use crate::params::{Method, Params};
+use crate::pose::{self, Posed};
+use crate::problem::Problem;
+use crate::{Embedded, Progress, certify, losses, overlap, place};
+
+/// Every layout that the params ask for, by method, each method once, in a fixed order.
+pub(crate) fn run_methods(
+    problem: &Problem,
+    views: &ViewHierarchy,
+    params: &Params,
+    seed: u64,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Vec<(Method, Layout)>, Error> {
+    let wants = |method: Method| params.method == method || params.methods.contains(&method);
+    let mut layouts = Vec::new();
+    if wants(Method::Projection) {
+        let positions = projection::positions(problem, &views.global);
+        layouts.push((Method::Projection, Layout::constructed("projection", positions)));
+    }
+    // Radial and cone cost next to nothing, and one of them is the way out when the method asked for crosses.
+    let radial = place::from_headings(problem, &radial::headings(problem));
+    let cone = place::from_headings(problem, &cone::headings(problem));
+    let swarm = if wants(Method::Pso) {
+        let radial = energy::score(problem, &radial, 0.0, 0);
+        let cone = energy::score(problem, &cone, 0.0, 0);
+        let radial = (radial.length_ratio.as_slice(), radial.angle_ratio.as_slice());
+        let cone = (cone.length_ratio.as_slice(), cone.angle_ratio.as_slice());
+        Some(pso::layout(problem, radial, cone, (params, seed), progress)?)
+    } else {
+        None
+    };
+    layouts.push((Method::Radial, Layout::constructed("radial", radial)));
+    layouts.push((Method::Cone, Layout::constructed("cone", cone)));
+    layouts.extend(swarm.map(|layout| (Method::Pso, layout)));
+    Ok(layouts)
+}
+
+/// A layout as it is written, with all that is said about it.
+struct Judged {
+    method: Method,
+    name: String,
+    posed: Posed,
+    certificate: Certificate,
+    scored: Scored,
+    losses: Losses,
+    overlaps: usize,
+    evaluations: u64,
+    trace: Vec<TracePoint>,
+}
+
+fn judge(problem: &Problem, space: &SpaceDistances, method: Method, layout: Layout) -> Judged {
+    let posed = pose::pose(problem, &layout.positions);
+    let certificate = certify::certify(&problem.parent, &posed.positions);
+    let scored = energy::score(problem, &posed.positions, posed.quantum_mm, certificate.crossings);
+    let mut losses = losses::losses(problem, &posed.positions);
+    (losses.stress, losses.spearman) = space.compare(&posed.positions);
+    let overlaps = overlap::count(problem, &posed.positions);
+    let Layout { name, evaluations, trace, .. } = layout;
+    Judged { method, name, posed, certificate, scored, losses, overlaps, evaluations, trace }
+}
+
+/// Judges the layouts and takes the best.
+pub(crate) fn select(
+    problem: &Problem,
+    layouts: Vec<(Method, Layout)>,
+    params: &Params,
+    seed: u64,
+) -> Result<Embedded, Error> {
+    let space = SpaceDistances::new(problem.tree);
+    let judged: Vec<Judged> =
+        layouts.into_par_iter().map(|(method, layout)| judge(problem, &space, method, layout)).collect();
+    let methods: Vec<MethodRow> = judged.iter().map(|judged| row(judged, problem.targets.kind)).collect();
+    let trace = judged.iter().flat_map(|judged| judged.trace.clone()).collect();
+    let winner_idx = winner(&judged, params.method)?;
+    check_never_worse(&judged, winner_idx, params.method)?;
+    let report = report(problem, &judged, &judged[winner_idx], params.method);
+
+    let Some(Judged { name, posed, certificate, scored, losses, method, .. }) =
+        judged.into_iter().nth(winner_idx)
+    else {
+        return Err(Error::Uncertified { crossings: 0, first: 0, second: 0 });
+    };
+    let termination = if scored.energy.length + scored.energy.angle == 0.0 {
+        Termination::Optimal
+    } else if params.method == Method::Pso || method == Method::Pso {
+        Termination::BudgetSpent
+    } else {
+        Termination::Constructed
+    };
+    let embedding = Embedding {
+        method: name,
+        seed,
+        positions_mm: posed.positions,
+        quantum_mm: posed.quantum_mm,
+        targets: problem.targets.clone(),
+        length_ratio: scored.length_ratio,
+        angle_ratio: scored.angle_ratio,
+        energy: scored.energy,
+        losses,
+        certificate,
+        pose: posed.pose,
+        termination,
+        trace,
+        methods,
+    };
+    Ok(Embedded { embedding, report })
+}
+
+/// The index of the layout to use.
+fn winner(judged: &[Judged], asked: Method) -> Result<usize, Error> {
+    let as_asked = judged.iter().position(|judged| judged.method == asked && judged.certificate.holds());
+    if let (Some(idx), false) = (as_asked, asked == Method::Pso) {
+        return Ok(idx);
+    }
+    let certified = judged.iter().enumerate().filter(|(_, judged)| judged.certificate.holds());
+    let energy = |judged: &Judged| judged.scored.energy.total();
+    let best = certified.min_by(|(_, a), (_, b)| energy(a).total_cmp(&energy(b)));
+    best.map(|(idx, _)| idx).ok_or_else(|| {
+        let fewest = judged.iter().min_by_key(|judged| judged.certificate.crossings);
+        let certificate = fewest.map_or_else(Certificate::default, |judged| judged.certificate.clone());
+        let (first, second) = certificate.pairs.first().copied().unwrap_or_default();
+        Error::Uncertified { crossings: certificate.crossings, first, second }
+    })
+}
+
+/// Asserts what is promised: under `pso`, no certified layout has a lower energy.
+fn check_never_worse(judged: &[Judged], winner_idx: usize, asked: Method) -> Result<(), Error> {
+    let energy = judged[winner_idx].scored.energy.total();
+    let is_better = |other: &&Judged| other.certificate.holds() && other.scored.energy.total() < energy;
+    match judged.iter().find(is_better) {
+        Some(better) if asked == Method::Pso => {
+            Err(Error::Worse { energy, method: better.name.clone(), incumbent: better.scored.energy.total() })
+        }
+        _ => Ok(()),
+    }
+}
+
+fn row(judged: &Judged, targets: TargetKind) -> MethodRow {
+    MethodRow {
+        method: judged.name.clone(),
+        crossings: judged.certificate.crossings,
+        overlaps: judged.overlaps,
+        energy: judged.scored.energy,
+        losses: judged.losses,
+        evaluations: judged.evaluations,
+        targets,
+    }
+}
+
+fn report(problem: &Problem, judged: &[Judged], winner: &Judged, asked: Method) -> Report {
+    let mut report = Report::default();
+    report.count_usize("nodes", problem.n_nodes());
+    report.count_usize("branches", problem.branches.list().len());
+    report.count_usize("crossings", winner.certificate.crossings);
+    report.count_usize("overlaps", winner.overlaps);
+    report.count("energy", winner.scored.energy.total());
+    report.count("length_loss_mean", winner.losses.length_loss_mean);
+    report.count("angle3d_error_mean_deg", winner.losses.angle3d_error_mean_deg);
+    report.count("evaluations", judged.iter().map(|judged| judged.evaluations as f64).sum::<f64>());
+    if winner.method != asked {
+        let reason = match judged.iter().find(|judged| judged.method == asked) {
+            Some(judged) if judged.certificate.holds() => {
+                format!("has the higher energy {:.4}", judged.scored.energy.total())
+            }
+            Some(judged) => format!("has {} crossings", judged.certificate.crossings),
+            None => "did not run".to_owned(),
+        };
+        let message = format!("the layout is by {}, because {} {reason}", winner.name, asked.name());
+        report.warn("W-EMBED-OTHER-METHOD", message);
+    }
+    report
+}

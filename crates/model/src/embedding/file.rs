@@ -1,0 +1,465 @@
+//! The files of an embedding: `embedding.json`, `nodes.tsv`, `compare.tsv`.
+//!
+//! JSON holds every number with the digits that read back to the same bits. The tables are for people and
+//! spreadsheets: coordinates with the decimals of the embedding's quantum, everything else as its column says.
+
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Certificate, Embedding, Energy, Losses, MethodRow, Pose, TargetKind, Targets, Termination, TracePoint,
+};
+use crate::table::{Table, fixed};
+use crate::tree::Tree;
+use crate::versioned::{self, FileError};
+
+const FORMAT: &str = "espalier-embedding";
+const VERSION: u32 = 1;
+
+impl TargetKind {
+    /// The name used in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Intrinsic => "intrinsic",
+            Self::Projected => "projected",
+        }
+    }
+}
+
+impl Termination {
+    /// The name used in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Constructed => "constructed",
+            Self::Optimal => "optimal",
+            Self::BudgetSpent => "budget-spent",
+        }
+    }
+}
+
+impl Embedding {
+    /// The text of `embedding.json`.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        versioned::to_json(FORMAT, VERSION, EmbeddingFile::from(self))
+    }
+
+    /// The embedding of `tree` in a text of `embedding.json`.
+    ///
+    /// # Errors
+    /// [`FileError`] if the text is not such a file, or not of this tree, or breaks a guarantee.
+    pub fn from_json(text: &str, tree: &Tree) -> Result<Self, FileError> {
+        let file: EmbeddingFile = versioned::from_json(FORMAT, VERSION, text)?;
+        check(&file, tree.n_nodes()).map_err(|what| FileError::Invalid { format: FORMAT, what })?;
+        Ok(file.into())
+    }
+
+    /// How many decimals a coordinate has.
+    #[must_use]
+    pub fn decimals(&self) -> usize {
+        decimals(self.quantum_mm)
+    }
+
+    /// The table `nodes.tsv`: each node in space and in the plane.
+    #[must_use]
+    pub fn nodes_tsv(&self, tree: &Tree) -> String {
+        let branches = tree.branches();
+        let decimals = self.decimals();
+        let mut table = Table::new(&[
+            "node",
+            "parent",
+            "x_mm",
+            "y_mm",
+            "z_mm",
+            "radius_mm",
+            "u_mm",
+            "v_mm",
+            "branch",
+            "generation",
+            "target_angle_deg",
+            "length_ratio",
+            "angle_ratio",
+        ]);
+        for (node, (data, flat)) in tree.nodes().iter().zip(&self.positions_mm).enumerate() {
+            let branch = branches.of_node(node);
+            let or_none = |value: Option<String>| value.unwrap_or_else(|| "n/a".to_owned());
+            table.row(&[
+                &node,
+                &or_none(data.parent.map(|parent| parent.to_string())),
+                &fixed(data.position_mm.x, decimals),
+                &fixed(data.position_mm.y, decimals),
+                &fixed(data.position_mm.z, decimals),
+                &fixed(data.radius_mm, decimals),
+                &fixed(flat.x, decimals),
+                &fixed(flat.y, decimals),
+                &or_none(branch.map(|branch| branch.to_string())),
+                &or_none(branch.map(|branch| branches.list()[branch].generation.to_string())),
+                &fixed(self.targets.angle_rad[node].to_degrees(), 6),
+                &fixed(self.length_ratio[node], 9),
+                &fixed(self.angle_ratio[node], 9),
+            ]);
+        }
+        table.into_string()
+    }
+}
+
+impl MethodRow {
+    /// The table `compare.tsv`: one row per method.
+    #[must_use]
+    pub fn to_tsv(rows: &[Self]) -> String {
+        let mut table = Table::new(&[
+            "method",
+            "crossings",
+            "overlaps",
+            "energy",
+            "length_loss_mean",
+            "length_loss_max",
+            "angle_loss_mean",
+            "angle_loss_max",
+            "angle3d_loss_mean",
+            "angle3d_loss_max",
+            "angle3d_error_mean_deg",
+            "angle3d_error_max_deg",
+            "stress",
+            "spearman",
+            "evaluations",
+            "targets",
+        ]);
+        for row in rows {
+            let losses = &row.losses;
+            table.row(&[
+                &row.method,
+                &row.crossings,
+                &row.overlaps,
+                &fixed(row.energy.total(), 6),
+                &fixed(losses.length_loss_mean, 6),
+                &fixed(losses.length_loss_max, 6),
+                &fixed(losses.angle_loss_mean, 6),
+                &fixed(losses.angle_loss_max, 6),
+                &fixed(losses.angle3d_loss_mean, 6),
+                &fixed(losses.angle3d_loss_max, 6),
+                &fixed(losses.angle3d_error_mean_deg, 4),
+                &fixed(losses.angle3d_error_max_deg, 4),
+                &fixed(losses.stress, 6),
+                &fixed(losses.spearman, 6),
+                &row.evaluations,
+                &row.targets.name(),
+            ]);
+        }
+        table.into_string()
+    }
+}
+
+/// Decimals of a quantum: a power of ten, or 0 where it is 1 mm or more.
+fn decimals(quantum_mm: f64) -> usize {
+    let exponent = espalier_geom::math::floor(0.5 - espalier_geom::math::log10(quantum_mm));
+    exponent.max(0.0) as usize
+}
+
+#[derive(Serialize, Deserialize)]
+struct EmbeddingFile {
+    method: String,
+    seed: u64,
+    targets: TargetsFile,
+    termination: TerminationFile,
+    quantum_mm: f64,
+    pose: PoseFile,
+    certificate: CertificateFile,
+    energy: EnergyFile,
+    losses: LossesFile,
+    methods: Vec<MethodRowFile>,
+    trace: Vec<TracePointFile>,
+    positions_mm: Vec<[f64; 2]>,
+    length_ratio: Vec<f64>,
+    angle_ratio: Vec<f64>,
+}
+
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum TargetKindFile {
+    Intrinsic,
+    Projected,
+}
+
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum TerminationFile {
+    Constructed,
+    Optimal,
+    BudgetSpent,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TargetsFile {
+    kind: TargetKindFile,
+    /// `null` for the root, which has no angle.
+    angle_rad: Vec<Option<f64>>,
+    length_mm: Vec<f64>,
+    heading_rad: Vec<f64>,
+    confidence: Vec<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EnergyFile {
+    length: f64,
+    angle: f64,
+    placement: f64,
+    crossing: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LossesFile {
+    length_loss_mean: f64,
+    length_loss_max: f64,
+    angle_loss_mean: f64,
+    angle_loss_max: f64,
+    angle3d_loss_mean: f64,
+    angle3d_loss_max: f64,
+    angle3d_error_mean_deg: f64,
+    angle3d_error_max_deg: f64,
+    stress: f64,
+    spearman: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CertificateFile {
+    crossings: usize,
+    pairs: Vec<(usize, usize)>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PoseFile {
+    rotation_rad: f64,
+    is_reflected: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TracePointFile {
+    iteration: u32,
+    evaluations: u64,
+    energy: f64,
+    crossings: usize,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MethodRowFile {
+    method: String,
+    crossings: usize,
+    overlaps: usize,
+    energy: EnergyFile,
+    losses: LossesFile,
+    evaluations: u64,
+    targets: TargetKindFile,
+}
+
+/// Checks the guarantees of an embedding with so many nodes; says which one fails and where.
+fn check(file: &EmbeddingFile, n_nodes: usize) -> Result<(), String> {
+    let TargetsFile { angle_rad, length_mm, heading_rad, confidence, .. } = &file.targets;
+    let angles: Vec<f64> = angle_rad.iter().map(|angle| angle.unwrap_or(0.0)).collect();
+    for (name, values) in [
+        ("targets.angle_rad", &angles),
+        ("targets.length_mm", length_mm),
+        ("targets.heading_rad", heading_rad),
+        ("targets.confidence", confidence),
+        ("length_ratio", &file.length_ratio),
+        ("angle_ratio", &file.angle_ratio),
+    ] {
+        check_column(name, values, n_nodes)?;
+    }
+    if let Some(node) = angle_rad.iter().skip(1).position(Option::is_none) {
+        return Err(format!("targets.angle_rad has no angle for node {}", node + 1));
+    }
+    let flat: Vec<f64> = file.positions_mm.iter().flatten().copied().collect();
+    check_column("positions_mm", &flat, 2 * n_nodes)?;
+
+    let n_decimals = decimals(file.quantum_mm);
+    if !(file.quantum_mm > 0.0 && format!("1e-{n_decimals}").parse() == Ok(file.quantum_mm)) {
+        return Err(format!("quantum_mm is {}, which is no power of ten up to 1", file.quantum_mm));
+    }
+    let is_rounded = |&value: &f64| format!("{value:.n_decimals$}").parse() == Ok(value);
+    if let Some(place) = flat.iter().position(|value| !is_rounded(value)) {
+        return Err(format!("positions_mm of node {} are not rounded to {}", place / 2, file.quantum_mm));
+    }
+    let is_edge = |edge: usize| (1..n_nodes).contains(&edge);
+    match file.certificate.pairs.iter().find(|&&(a, b)| !is_edge(a) || !is_edge(b)) {
+        Some(pair) => Err(format!("certificate.pairs names edges {pair:?} of a tree of {n_nodes} nodes")),
+        None if file.certificate.pairs.len() > file.certificate.crossings => {
+            Err(format!("certificate.pairs are more than the {} crossings", file.certificate.crossings))
+        }
+        None => Ok(()),
+    }
+}
+
+fn check_column(name: &str, values: &[f64], n_expected: usize) -> Result<(), String> {
+    if values.len() != n_expected {
+        return Err(format!("{name} has {} numbers, the tree needs {n_expected}", values.len()));
+    }
+    match values.iter().position(|value| !value.is_finite()) {
+        Some(place) => Err(format!("{name} is not finite at {place}")),
+        None => Ok(()),
+    }
+}
+
+impl From<&Embedding> for EmbeddingFile {
+    fn from(embedding: &Embedding) -> Self {
+        Self {
+            method: embedding.method.clone(),
+            seed: embedding.seed,
+            targets: (&embedding.targets).into(),
+            termination: embedding.termination.into(),
+            quantum_mm: embedding.quantum_mm,
+            pose: PoseFile {
+                rotation_rad: embedding.pose.rotation_rad,
+                is_reflected: embedding.pose.is_reflected,
+            },
+            certificate: CertificateFile {
+                crossings: embedding.certificate.crossings,
+                pairs: embedding.certificate.pairs.clone(),
+            },
+            energy: embedding.energy.into(),
+            losses: embedding.losses.into(),
+            methods: embedding.methods.iter().map(Into::into).collect(),
+            trace: embedding.trace.iter().copied().map(Into::into).collect(),
+            positions_mm: embedding.positions_mm.iter().map(DVec2::to_array).collect(),
+            length_ratio: embedding.length_ratio.clone(),
+            angle_ratio: embedding.angle_ratio.clone(),
+        }
+    }
+}
+
+impl From<EmbeddingFile> for Embedding {
+    fn from(file: EmbeddingFile) -> Self {
+        Self {
+            method: file.method,
+            seed: file.seed,
+            positions_mm: file.positions_mm.into_iter().map(DVec2::from_array).collect(),
+            quantum_mm: file.quantum_mm,
+            targets: file.targets.into(),
+            length_ratio: file.length_ratio,
+            angle_ratio: file.angle_ratio,
+            energy: file.energy.into(),
+            losses: file.losses.into(),
+            certificate: Certificate { crossings: file.certificate.crossings, pairs: file.certificate.pairs },
+            pose: Pose { rotation_rad: file.pose.rotation_rad, is_reflected: file.pose.is_reflected },
+            termination: file.termination.into(),
+            trace: file.trace.into_iter().map(Into::into).collect(),
+            methods: file.methods.into_iter().map(Into::into).collect(),
+        }
+    }
+}
+
+impl From<&Targets> for TargetsFile {
+    fn from(targets: &Targets) -> Self {
+        let known = |&angle: &f64| (!angle.is_nan()).then_some(angle);
+        Self {
+            kind: targets.kind.into(),
+            angle_rad: targets.angle_rad.iter().map(known).collect(),
+            length_mm: targets.length_mm.clone(),
+            heading_rad: targets.heading_rad.clone(),
+            confidence: targets.confidence.clone(),
+        }
+    }
+}
+
+impl From<TargetsFile> for Targets {
+    fn from(file: TargetsFile) -> Self {
+        Self {
+            kind: file.kind.into(),
+            angle_rad: file.angle_rad.into_iter().map(|angle| angle.unwrap_or(f64::NAN)).collect(),
+            length_mm: file.length_mm,
+            heading_rad: file.heading_rad,
+            confidence: file.confidence,
+        }
+    }
+}
+
+impl From<&MethodRow> for MethodRowFile {
+    fn from(row: &MethodRow) -> Self {
+        Self {
+            method: row.method.clone(),
+            crossings: row.crossings,
+            overlaps: row.overlaps,
+            energy: row.energy.into(),
+            losses: row.losses.into(),
+            evaluations: row.evaluations,
+            targets: row.targets.into(),
+        }
+    }
+}
+
+impl From<MethodRowFile> for MethodRow {
+    fn from(file: MethodRowFile) -> Self {
+        Self {
+            method: file.method,
+            crossings: file.crossings,
+            overlaps: file.overlaps,
+            energy: file.energy.into(),
+            losses: file.losses.into(),
+            evaluations: file.evaluations,
+            targets: file.targets.into(),
+        }
+    }
+}
+
+/// Conversions there and back between two structs with the same fields.
+macro_rules! same_fields {
+    ($memory:ident, $file:ident { $($field:ident),* $(,)? }) => {
+        impl From<$memory> for $file {
+            fn from(memory: $memory) -> Self {
+                Self { $($field: memory.$field),* }
+            }
+        }
+
+        impl From<$file> for $memory {
+            fn from(file: $file) -> Self {
+                Self { $($field: file.$field),* }
+            }
+        }
+    };
+}
+
+/// Conversions there and back between two enums with the same variants.
+macro_rules! same_variants {
+    ($memory:ident, $file:ident { $($variant:ident),* $(,)? }) => {
+        impl From<$memory> for $file {
+            fn from(memory: $memory) -> Self {
+                match memory { $($memory::$variant => Self::$variant),* }
+            }
+        }
+
+        impl From<$file> for $memory {
+            fn from(file: $file) -> Self {
+                match file { $($file::$variant => Self::$variant),* }
+            }
+        }
+    };
+}
+
+same_fields!(Energy, EnergyFile { length, angle, placement, crossing });
+same_fields!(TracePoint, TracePointFile { iteration, evaluations, energy, crossings });
+same_fields!(
+    Losses,
+    LossesFile {
+        length_loss_mean,
+        length_loss_max,
+        angle_loss_mean,
+        angle_loss_max,
+        angle3d_loss_mean,
+        angle3d_loss_max,
+        angle3d_error_mean_deg,
+        angle3d_error_max_deg,
+        stress,
+        spearman,
+    }
+);
+same_variants!(TargetKind, TargetKindFile { Intrinsic, Projected });
+same_variants!(Termination, TerminationFile { Constructed, Optimal, BudgetSpent });
