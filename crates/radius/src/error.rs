@@ -1,0 +1,53 @@
+//! Why radii cannot be measured.
+
+use espalier_model::Diagnose;
+use espalier_model::diagnose::Class;
+
+/// Why radii cannot be measured.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// Mask and skeleton lie on different grids.
+    #[error(
+        "mask and skeleton lie on different grids: {}x{}x{} and {}x{}x{} voxels, or another place in space",
+        .mask[0], .mask[1], .mask[2], .skeleton[0], .skeleton[1], .skeleton[2]
+    )]
+    GridMismatch {
+        /// The mask's extents.
+        mask: [usize; 3],
+        /// The skeleton's extents.
+        skeleton: [usize; 3],
+    },
+    /// The skeleton has no voxel.
+    #[error("the skeleton is empty: it has 0 voxels, so there is nothing to measure")]
+    EmptySkeleton,
+    /// A skeleton voxel is background in the mask.
+    #[error("skeleton voxel ({}, {}, {}) is background in the mask", .voxel[0], .voxel[1], .voxel[2])]
+    OutsideMask {
+        /// The first such voxel (x, y, z).
+        voxel: [u32; 3],
+    },
+}
+
+impl Diagnose for Error {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::GridMismatch { .. } => "E-RADIUS-GRID",
+            Self::EmptySkeleton => "E-RADIUS-EMPTY",
+            Self::OutsideMask { .. } => "E-RADIUS-OUTSIDE-MASK",
+        }
+    }
+
+    fn class(&self) -> Class {
+        Class::Input
+    }
+
+    fn hint(&self) -> String {
+        match self {
+            Self::GridMismatch { .. } | Self::OutsideMask { .. } => {
+                "give the mask that the skeleton was thinned from".to_owned()
+            }
+            Self::EmptySkeleton => "thin with thinning = \"safe\", which lets nothing vanish".to_owned(),
+        }
+    }
+}

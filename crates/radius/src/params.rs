@@ -1,0 +1,58 @@
+//! Parameters of the radius measurement.
+
+use espalier_model::diagnose::ParamError;
+use serde::{Deserialize, Serialize};
+
+/// Parameters of the radius measurement: `[radius]` in the config.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Params {
+    /// Where the distance is read. Default `ridge`.
+    pub rule: Rule,
+    /// How many voxels a centre may climb from its skeleton voxel to the ridge, 0–10. Default 3: thinning leaves
+    /// the skeleton at most two or three voxels off the axis. Larger values only help masks with very uneven
+    /// walls.
+    pub climb_steps: u32,
+    /// Added to each radius, in voxels of the smallest spacing, −1 to 1. Default 0: a voxel belongs to the mask if
+    /// its centre does, so the nearest background centre lies where the boundary is. −0.5 suits masks that hold
+    /// every voxel they touch, 0.5 masks that hold only voxels inside as a whole.
+    pub offset_voxels: f64,
+}
+
+/// Where the distance to the background is read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rule {
+    /// On the ridge of the distance between voxels, across the branch.
+    #[default]
+    Ridge,
+    /// The largest distance among the 27 voxels about the skeleton voxel.
+    NeighborhoodMax,
+    /// At the skeleton voxel itself, as most programs do; too small, since skeletons run off the axis.
+    Voxel,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self { rule: Rule::Ridge, climb_steps: 3, offset_voxels: 0.0 }
+    }
+}
+
+impl Params {
+    /// Checks the ranges.
+    ///
+    /// # Errors
+    /// At the first value outside its range.
+    pub fn validate(&self) -> Result<(), ParamError> {
+        ParamError::check(
+            "climb_steps",
+            self.climb_steps <= 10,
+            format!("must be 0 to 10, is {}", self.climb_steps),
+        )?;
+        ParamError::check(
+            "offset_voxels",
+            (-1.0..=1.0).contains(&self.offset_voxels),
+            format!("must be -1 to 1, is {}", self.offset_voxels),
+        )
+    }
+}
