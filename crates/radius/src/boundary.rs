@@ -24,6 +24,7 @@ const MAX_MOVES: usize = 3;
 /// The background centres about a point, in grid mm.
 pub(crate) struct Boundary {
     sites: Vec<DVec3>,
+    spacing: DVec3,
 }
 
 impl Boundary {
@@ -34,7 +35,7 @@ impl Boundary {
         let reach = REACH * spacing.max_element();
         // |site − voxel| ≤ D(voxel) + 2·|q − voxel| for the site nearest to any q within reach.
         let radius = field.distance_mm(voxel) + 2.0 * (reach + point.distance(field.position_mm(voxel)));
-        let mut boundary = Self { sites: Vec::new() };
+        let mut boundary = Self { sites: Vec::new(), spacing };
         if radius.is_finite() {
             boundary.gather(field, voxel, radius);
             let farthest = boundary.distance_mm(point) + 2.0 * reach;
@@ -68,22 +69,23 @@ impl Boundary {
     }
 
     /// The point near `start`, across the branch, whose distance is largest, and that distance.
-    pub(crate) fn refine(&self, start: DVec3, tangent: Option<DVec3>, spacing: DVec3) -> (DVec3, f64) {
+    pub(crate) fn highest_near(&self, start: DVec3, tangent: Option<DVec3>) -> (DVec3, f64) {
         let directions: Vec<DVec3> = match tangent {
             Some(tangent) => {
                 let (right, up) = plane_axes(tangent, DVec3::Z);
                 vec![right, up, -right, -up]
             }
-            None => Vec::new(),
+            // Where branches meet, any way leads to the largest sphere.
+            None => vec![DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z],
         };
-        let reach = REACH * spacing.max_element();
+        let reach = REACH * self.spacing.max_element();
         let mut best = (start, self.distance_mm(start));
         for step in STEPS {
             for _ in 0..MAX_MOVES {
                 let before = best.1;
                 for direction in &directions {
                     // The spacing that this direction sees.
-                    let length = step * (*direction * spacing).length();
+                    let length = step * (*direction * self.spacing).length();
                     let point = best.0 + *direction * length;
                     if point.distance(start) > reach {
                         continue;

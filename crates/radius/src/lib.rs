@@ -6,7 +6,8 @@
 //! | 2 | `tangent` | which way the skeleton runs at each of its voxels |
 //! | 3 | `center` | from the voxel up to the ridge of the distance field, across the branch only |
 //! | 4 | `boundary` | the background centres around it: the distance at any point between voxels |
-//! | 5 | `section` | area of the mask's cross-section there |
+//! | 5 | `gap` | the wall lies between the last voxels inside and the first outside |
+//! | 6 | `section` | area of the mask's cross-section there |
 //!
 //! **Spaces** inside this crate points are *grid mm*: voxel coordinates times spacing. Spheres come out in RAS+ mm.
 
@@ -14,6 +15,7 @@ mod boundary;
 mod center;
 mod distance;
 mod error;
+mod gap;
 mod params;
 mod section;
 mod tangent;
@@ -86,10 +88,7 @@ fn measure(
         Rule::NeighborhoodMax => {
             (center::on_ridge(field, voxel, tangent, params.climb_steps), field.neighborhood_max_mm(voxel))
         }
-        Rule::Ridge => {
-            let start = center::on_ridge(field, voxel, tangent, params.climb_steps);
-            Boundary::around(field, start).refine(start, tangent, spacing)
-        }
+        Rule::Ridge => on_ridge_between_voxels(field, voxel, tangent, params.climb_steps),
     };
     let border_mm = distance_to_border(grid, center);
     // Without any background the border of the scan is all there is to measure.
@@ -103,6 +102,28 @@ fn measure(
             .and_then(|tangent| section::area_radius_mm(mask, center, tangent, radius_mm))
             .unwrap_or(f64::NAN),
         is_cut: border_mm < radius_mm,
+    }
+}
+
+/// Centre and radius by [`Rule::Ridge`].
+fn on_ridge_between_voxels(
+    field: &DistanceField,
+    voxel: [i64; 3],
+    tangent: Option<DVec3>,
+    climb_steps: u32,
+) -> (DVec3, f64) {
+    let start = center::on_ridge(field, voxel, tangent, climb_steps);
+    let (mut center, mut distance_mm) = Boundary::around(field, start).highest_near(start, tangent);
+    if distance_mm < field.distance_mm(voxel) {
+        // In branches of one or two voxels the weighted centroid can lie nearer to the wall than the voxel.
+        let start = field.position_mm(voxel);
+        (center, distance_mm) = Boundary::around(field, start).highest_near(start, tangent);
+    }
+    match tangent {
+        Some(tangent) if distance_mm.is_finite() => {
+            (center, gap::radius_in_gap(center, tangent, distance_mm, field.spacing_mm()))
+        }
+        _ => (center, distance_mm),
     }
 }
 
