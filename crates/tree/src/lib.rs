@@ -8,7 +8,7 @@
 //! | 4 | `living`, `prune`, `root` | spurs go, the root is chosen |
 //! | 5 | `outline` | lines between root, forks and tips |
 //! | 6 | `forks` | forks move to where the branches' axes meet |
-//! | 7 | `tips` | free ends go to the end of the mask |
+//! | 7 | `tips` | free ends are set where the organ ends |
 //! | 8 | `smooth` | the voxel staircase goes |
 //! | 9 | `merge`, `resample` | nodes where the shape changes |
 //! | – | `traced` | roots, duplicates and radii of a traced structure |
@@ -92,10 +92,8 @@ pub fn build(
     smooth::space_evenly(&mut outline, mask.grid());
     report.count("forks_moved_mean_mm", forks::relocate(&mut outline, mask));
     smooth::space_evenly(&mut outline, mask.grid());
-    if params.tips == Tips::Extend {
-        tips::extend(&mut outline, mask, &mut ledger);
-        smooth::space_evenly(&mut outline, mask.grid());
-    }
+    tips::set(&mut outline, mask, params.tips, &mut ledger);
+    smooth::space_evenly(&mut outline, mask.grid());
     smooth::smooth(&mut outline, mask.grid(), params.smooth_voxels);
 
     let kind = if params.resample == Resample::Auto { Resample::Shape } else { params.resample };

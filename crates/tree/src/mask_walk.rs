@@ -12,17 +12,24 @@ pub(crate) fn is_inside(mask: &Mask, point_mm: DVec3) -> bool {
     mask.grid().voxel_at(point_voxel).is_some_and(|voxel| mask.contains(voxel.map(|v| v as i64)))
 }
 
-/// How far a ray from `origin_mm` stays in the mask, at most `limit_mm`; 0 if it starts outside.
-pub(crate) fn free_length_mm(mask: &Mask, origin_mm: DVec3, direction: DVec3, limit_mm: f64) -> f64 {
+/// How far a ray from `origin_mm` stays in the mask, at most `limit_mm`; `None` if it starts outside.
+pub(crate) fn free_length_mm(mask: &Mask, origin_mm: DVec3, direction: DVec3, limit_mm: f64) -> Option<f64> {
     let step_mm = RAY_STEP * mask.grid().spacing_mm().min_element();
-    let mut inside_mm = 0.0;
+    let mut inside_mm = None;
     let mut n_steps = 0.0;
     while is_inside(mask, origin_mm + direction * (step_mm * n_steps)) {
-        inside_mm = step_mm * n_steps;
-        if inside_mm >= limit_mm {
-            return limit_mm;
+        inside_mm = Some(step_mm * n_steps);
+        if step_mm * n_steps >= limit_mm {
+            return Some(limit_mm);
         }
         n_steps += 1.0;
     }
     inside_mm
+}
+
+/// Whether a ray that stays in the mask for `free_mm` leaves the scan there.
+pub(crate) fn leaves_scan(mask: &Mask, origin_mm: DVec3, direction: DVec3, free_mm: f64) -> bool {
+    let step_mm = RAY_STEP * mask.grid().spacing_mm().min_element();
+    let next_mm = origin_mm + direction * (free_mm + step_mm);
+    mask.grid().voxel_at(mask.grid().voxel_from_world().transform_point3(next_mm)).is_none()
 }

@@ -36,14 +36,17 @@ pub enum Root {
     Superior,
 }
 
-/// What to do with the free ends of a skeleton.
+/// Where the free ends of the tree are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Tips {
-    /// Lead each along its tangent to the end of the mask.
+    /// At the centre of the sphere that touches the end of the mask: drawn with its radius, as round cones are,
+    /// the tree fills the mask and goes no further. Where the scan cuts a vessel off, at the border.
     #[default]
-    Extend,
-    /// Leave them where thinning ended.
+    Sphere,
+    /// At the end of the mask, at most a radius beyond the last sphere.
+    Surface,
+    /// Where thinning ended.
     Keep,
 }
 
@@ -109,7 +112,9 @@ pub struct Params {
     /// projected spacing). 0 to 4, 0 smooths nothing. Default 1, enough to take the voxel staircase away.
     /// Larger cuts corners.
     pub smooth_voxels: f64,
-    /// What to do with free ends. Default `extend`: thinning leaves them 0.6–1.2 voxels short.
+    /// Where the free ends are; either way they are led along their tangent, since thinning ends them anywhere
+    /// between the last sphere and the surface. Default `sphere`: the length of a tube with round ends is that of its
+    /// axis. `surface` makes each end longer by its radius.
     pub tips: Tips,
     /// How densely nodes stand on a branch. Default `auto`.
     pub resample: Resample,

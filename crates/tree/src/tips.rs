@@ -1,14 +1,16 @@
-//! Free ends go to the end of the mask.
+//! Free ends are set where the organ ends.
 //!
 //! A curve skeleton ends somewhere between the last inscribed sphere and the surface, often bent towards a corner.
 //!
-//! **Input** [`Outline`] with evenly spaced lines. **Output** the same, with free ends (tips and the root) led straight
-//! to the end of the mask; a ledger entry for each.
+//! **Input** [`Outline`] with evenly spaced lines. **Output** the same, its free ends (tips and the root) moved along
+//! their tangents; a ledger entry for each that became longer.
 //! **Steps** 1. The end sphere is the outermost one that has nearly the calibre of the tip; what lies beyond it follows
 //! the surface and is dropped. 2. Fit a straight line to the stretch inside of it: the tangent, on which the end
-//! is set. 3. Go on along the tangent while inside the mask, by at most the radius of the end sphere.
-//! **Which end?** The truth is where the axis leaves the organ: the flat end of a tube cut across, the apex of a rounded
-//! one. Both lie one radius beyond the end sphere, so one rule serves both.
+//! is set. 3. See how far the mask goes on along the tangent, at most to twice the radius of the end sphere. 4. `sphere`:
+//! the end is one radius before that; `surface`: there, at most one radius beyond the end sphere; at the border
+//! of the scan both are the border.
+//! **Which end is true?** A tube cut across and one with a round end have the same last sphere, one radius before the
+//! end of the mask, and the round cones by which a tree stands for its organ add that radius again.
 //! **Left alone** stubs of opened loops: they are no ends of the organ.
 //! **Cost** O(N + steps along the tangents).
 
@@ -16,8 +18,9 @@ use espalier_model::{Ledger, LedgerEntry, LedgerKind, Mask};
 
 use crate::curve::{arc_lengths_mm, fit_line};
 use crate::graph::Sample;
-use crate::mask_walk::free_length_mm;
+use crate::mask_walk::{free_length_mm, leaves_scan};
 use crate::outline::Outline;
+use crate::params::Tips;
 
 /// A sphere reaches a tip if the tip is at most this multiple of its radius away.
 const REACH: f64 = 1.25;
@@ -25,70 +28,90 @@ const REACH: f64 = 1.25;
 const NEARLY: f64 = 0.9;
 /// The length of the stretch that gives the tangent, in calibres.
 const STRETCH: f64 = 2.0;
-/// At most this share of a line is dropped as following the surface.
+/// At most this share of a line is dropped as following the surface, or by setting its end back.
 const MAX_DROPPED: f64 = 0.5;
+/// How far the mask is followed beyond the end sphere's centre, in its radii.
+const LOOK_AHEAD: f64 = 2.0;
 
-/// Extends all free ends; returns how many.
-pub(crate) fn extend(outline: &mut Outline, mask: &Mask, ledger: &mut Ledger) -> usize {
+/// A line with its tip moved.
+struct Moved {
+    /// From the tip inwards.
+    samples: Vec<Sample>,
+    /// By how much the tip is further out than it was; negative if it was set back.
+    outwards_mm: f64,
+}
+
+/// Sets all free ends.
+pub(crate) fn set(outline: &mut Outline, mask: &Mask, tips: Tips, ledger: &mut Ledger) {
     let incident = outline.incidence();
-    let mut n_extended = 0;
     for (hub, lines) in incident.iter().enumerate() {
         let &[line_idx] = lines.as_slice() else { continue };
-        if outline.hubs[hub].is_stub {
+        if tips == Tips::Keep || outline.hubs[hub].is_stub {
             continue;
         }
         // Count the samples from the tip inwards, whichever way the line runs.
         let is_root = hub == outline.lines[line_idx].from;
-        let mut samples = outline.lines[line_idx].samples.clone();
+        let mut inwards = outline.lines[line_idx].samples.clone();
         if !is_root {
-            samples.reverse();
+            inwards.reverse();
         }
-        let Some((extended, length_mm)) = extended(&samples, mask) else { continue };
-        samples = extended;
-        outline.hubs[hub].sample = samples[0];
-        ledger.0.push(LedgerEntry {
-            kind: LedgerKind::TipExtended,
-            position_mm: samples[0].position_mm,
-            radius_mm: samples[0].radius_mm,
-            length_mm,
-            reason: format!(
-                "led {length_mm:.3} mm beyond its end sphere of radius {:.3} mm, to the end of the mask or by that radius",
-                samples[0].radius_mm
-            ),
-        });
+        let Some(Moved { mut samples, outwards_mm }) = moved(&inwards, mask, tips) else { continue };
+        let tip = samples[0];
+        outline.hubs[hub].sample = tip;
+        if outwards_mm > 0.0 {
+            ledger.0.push(LedgerEntry {
+                kind: LedgerKind::TipExtended,
+                position_mm: tip.position_mm,
+                radius_mm: tip.radius_mm,
+                length_mm: outwards_mm,
+                reason: format!(
+                    "thinning ended {outwards_mm:.3} mm before the end of a branch of radius {:.3} mm",
+                    tip.radius_mm
+                ),
+            });
+        }
         if !is_root {
             samples.reverse();
         }
         outline.lines[line_idx].samples = samples;
-        n_extended += 1;
     }
-    n_extended
 }
 
-/// The samples of a line from its tip inwards, the tip led to the end of the mask, and by how much beyond the end
-/// sphere. `None` if the line is too short to have a tangent.
-fn extended(samples: &[Sample], mask: &Mask) -> Option<(Vec<Sample>, f64)> {
-    let arcs = arc_lengths_mm(samples);
-    let total_mm = *arcs.last()?;
-    let tip = samples[0];
-    let calibre_mm = samples
+/// A line, given from its tip inwards, with its tip where it belongs. `None` if the line is too short to have a
+/// tangent, or its tangent runs outside of the mask.
+fn moved(inwards: &[Sample], mask: &Mask, tips: Tips) -> Option<Moved> {
+    let arcs = arc_lengths_mm(inwards);
+    let droppable_mm = MAX_DROPPED * arcs.last()?;
+    let tip = inwards[0];
+    let calibre_mm = inwards
         .iter()
         .filter(|s| s.position_mm.distance(tip.position_mm) <= REACH * s.radius_mm)
         .map(|s| s.radius_mm)
         .fold(tip.radius_mm, f64::max);
-    let end = samples.iter().position(|s| s.radius_mm >= NEARLY * calibre_mm)?;
-    let end = if arcs[end] <= MAX_DROPPED * total_mm { end } else { 0 };
+    let end = inwards.iter().position(|s| s.radius_mm >= NEARLY * calibre_mm)?;
+    let end = if arcs[end] <= droppable_mm { end } else { 0 };
+    let radius_mm = inwards[end].radius_mm;
 
     let inner = arcs.iter().rposition(|&arc| arc <= arcs[end] + STRETCH * calibre_mm)?;
-    let fit = fit_line(&samples[end..=inner])?;
-    let on_axis =
-        fit.point_mm + (samples[end].position_mm - fit.point_mm).project_onto_normalized(fit.direction);
-    let length_mm = free_length_mm(mask, on_axis, -fit.direction, samples[end].radius_mm);
-    let radius_mm = samples[end].radius_mm;
-    let mut line = vec![Sample { position_mm: on_axis - fit.direction * length_mm, radius_mm }];
-    if length_mm > 0.0 {
-        line.push(Sample { position_mm: on_axis, radius_mm });
-    }
-    line.extend_from_slice(&samples[end + 1..]);
-    Some((line, length_mm))
+    let fit = fit_line(&inwards[end..=inner])?;
+    let outwards = -fit.direction;
+    let on_axis = fit.point_mm + (inwards[end].position_mm - fit.point_mm).project_onto_normalized(outwards);
+
+    let free_mm = free_length_mm(mask, on_axis, outwards, LOOK_AHEAD * radius_mm)?;
+    let ends_at_border = leaves_scan(mask, on_axis, outwards, free_mm);
+    let beyond_mm = match tips {
+        _ if ends_at_border => free_mm,
+        Tips::Sphere => free_mm - radius_mm,
+        Tips::Surface => free_mm.min(radius_mm),
+        Tips::Keep => 0.0,
+    };
+    let beyond_mm = beyond_mm.max(arcs[end] - droppable_mm);
+
+    let new_tip = Sample { position_mm: on_axis + outwards * beyond_mm, radius_mm };
+    let mut samples = vec![new_tip];
+    let stays = |s: &&Sample| (s.position_mm - new_tip.position_mm).dot(outwards) < 0.0;
+    let first_kept = end + 1 + inwards[end + 1..].iter().position(|s| stays(&s)).unwrap_or(0);
+    samples.extend_from_slice(&inwards[first_kept.min(inwards.len() - 1)..]);
+    let outwards_mm = (new_tip.position_mm - tip.position_mm).dot(outwards);
+    Some(Moved { samples, outwards_mm })
 }

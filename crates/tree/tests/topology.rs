@@ -33,18 +33,34 @@ fn one_and_two_voxels_are_trees() {
 }
 
 #[test]
-fn line_keeps_its_length_or_grows_to_the_end_of_the_mask() {
+fn line_ends_where_its_last_sphere_is_or_at_the_surface() {
     let places = run([5, 30, 4], [45, 30, 4], 3.0);
     let keep = Params { tips: Tips::Keep, ..Params::default() };
     let kept = tree_of(&places, SHAPE, &keep).expect("a tree").tree;
     assert_eq!(kept.n_nodes(), 2, "a straight line needs two nodes");
     assert!((kept.length_mm() - 40.0).abs() < 1e-9);
 
-    // The spheres about both ends reach 3 voxel centres further.
-    let grown = tree_of(&places, SHAPE, &Params::default()).expect("a tree");
-    assert!((grown.tree.length_mm() - 46.0).abs() < 0.01, "{}", grown.tree.length_mm());
-    assert_eq!(grown.ledger.n_of(LedgerKind::TipExtended), 2);
-    assert_eq!(grown.report.get("tips_extended"), Some(2.0));
+    // The mask ends at the faces of the voxels 3 further out, the spheres have radius 3.
+    let whole = tree_of(&places, SHAPE, &Params::default()).expect("a tree");
+    assert!((whole.tree.length_mm() - 41.0).abs() < 0.3, "{}", whole.tree.length_mm());
+    assert_eq!(whole.ledger.n_of(LedgerKind::TipExtended), 2);
+    assert_eq!(whole.report.get("tips_extended"), Some(2.0));
+    let surface = Params { tips: Tips::Surface, ..Params::default() };
+    let grown = tree_of(&places, SHAPE, &surface).expect("a tree").tree;
+    assert!((grown.length_mm() - 46.0).abs() < 0.3, "{}", grown.length_mm());
+}
+
+#[test]
+fn tips_that_follow_the_surface_are_set_back() {
+    // The last three voxels bend to a corner while their spheres shrink.
+    let mut places = run([5, 30, 4], [45, 30, 4], 4.0);
+    places.extend([([46, 31, 4], 3.0), ([47, 32, 4], 2.0), ([48, 33, 4], 1.0)]);
+    let tree = tree_of(&places, SHAPE, &Params::default()).expect("a tree").tree;
+    let end = tree.position_mm(tree.n_nodes() - 1);
+    let start = tree.position_mm(0);
+    let far = if end.x > start.x { end } else { start };
+    assert!((far.x - 45.0).abs() < 1.0 && (far.y - 30.0).abs() < 0.5, "{far}");
+    assert!(tree.nodes().iter().all(|node| node.radius_mm > 3.5));
 }
 
 #[test]
