@@ -49,7 +49,7 @@ fn earlier_steps(lattice: &Lattice) -> Vec<(isize, u16)> {
             let d = [bit % 3 - 1, bit / 3 % 3 - 1, bit / 9 - 1];
             let offset = (0..3).map(|axis| d[axis] * strides[axis]).sum();
             let squared: f64 =
-                (0..3).map(|axis| (d[axis] as f64 * spacing[axis] / smallest)).map(|l| l * l).sum();
+                (0..3).map(|axis| d[axis] as f64 * spacing[axis] / smallest).map(|l| l * l).sum();
             let kind = d.iter().filter(|&&step| step != 0).count();
             let weight = (UNITS_PER_SPACING * FACTORS[kind] * squared.sqrt()).round();
             (offset, weight.min(f64::from(u16::MAX)) as u16)

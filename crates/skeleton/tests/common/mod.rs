@@ -41,3 +41,49 @@ pub fn mask_of(shape: [usize; 3], inside: impl Fn(DVec3) -> bool) -> Mask {
         .collect();
     Mask::new(grid, voxels)
 }
+
+/// The skeleton as a mask on the same grid.
+pub fn skeleton_mask(mask: &Mask, params: &espalier_skeleton::Params) -> Mask {
+    let thinned = espalier_skeleton::skeletonize(mask, params).expect("not empty");
+    let mut out = Mask::empty(mask.grid().clone());
+    for voxel in thinned.skeleton.voxels() {
+        let index = mask.grid().index(voxel.map(|c| c as usize));
+        out.as_mut_slice()[index] = true;
+    }
+    out
+}
+
+/// 26-connected components and Euler number, counted cell by cell, apart from the crate's own code.
+pub fn topology(mask: &Mask) -> (usize, i32) {
+    let grid = mask.grid();
+    let mut cells = std::collections::BTreeSet::new();
+    let mut left = std::collections::BTreeSet::new();
+    for voxel in (0..grid.n_voxels()).filter(|&i| mask.as_slice()[i]).map(|i| grid.voxel(i).map(|c| c as i64))
+    {
+        left.insert(voxel);
+        for d in offsets() {
+            cells.insert([0, 1, 2].map(|axis| 2 * voxel[axis] + d[axis]));
+        }
+    }
+    let euler =
+        cells.iter().map(|cell| if cell.iter().filter(|c| *c % 2 != 0).count() % 2 == 1 { 1 } else { -1 });
+    let euler = euler.sum();
+    let mut n_components = 0;
+    while let Some(seed) = left.pop_first() {
+        n_components += 1;
+        let mut stack = vec![seed];
+        while let Some(voxel) = stack.pop() {
+            for d in offsets() {
+                let neighbor = [0, 1, 2].map(|axis| voxel[axis] + d[axis]);
+                if left.remove(&neighbor) {
+                    stack.push(neighbor);
+                }
+            }
+        }
+    }
+    (n_components, euler)
+}
+
+fn offsets() -> impl Iterator<Item = [i64; 3]> {
+    (0..27).map(|bit| [bit % 3 - 1, bit / 3 % 3 - 1, bit / 9 - 1])
+}
