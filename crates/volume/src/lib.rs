@@ -38,9 +38,11 @@ mod segment;
 
 mod error;
 mod params;
+mod read_error;
 
-pub use error::{Error, ReadError};
+pub use error::Error;
 pub use kind::{Kind, inspect_kind};
 pub use params::{AssumedSpace, Components, Method, Params, ReadOptions};
 pub use read::{Loaded, read};
+pub use read_error::ReadError;
 pub use segment::{Segmented, segment};

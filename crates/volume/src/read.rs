@@ -12,7 +12,7 @@
 use std::path::Path;
 
 use espalier_model::nifti_out::stored_grid;
-use espalier_model::{Grid, GridError, Report, Volume};
+use espalier_model::{Grid, GridError, Report, Volume, Voxels};
 
 use crate::nifti::{self, Header, N_HEADER_BYTES};
 use crate::source::Source;
@@ -44,58 +44,67 @@ fn read_nifti(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
     let mut report = Report::default();
     let mut source = Source::open(path)?;
 
-    // Check the header.
+    // Check the header, and the declared size against the file and the limit.
     let mut bytes = [0_u8; N_HEADER_BYTES];
     source.expect(N_HEADER_BYTES as u64)?;
     source.take(&mut bytes)?;
-    let header = nifti::parse(&bytes, &mut report)?;
-
-    // Compare the declared size with the file and the limit.
+    let header = nifti::parse(&bytes, &mut report).map_err(|error| source.damage().unwrap_or(error))?;
     let index = volume_index(&header, options)?;
-    let volume_bytes = header.n_voxels() * header.scalar.file_bytes();
-    let end = u128::from(volume_bytes) * u128::from(header.n_volumes) + u128::from(header.offset);
-    source.expect(u64::try_from(end).unwrap_or(u64::MAX))?;
-    let needed = header.n_voxels() * header.scalar.memory_bytes();
-    if needed > options.max_bytes {
-        return Err(ReadError::TooLarge { needed, limit: options.max_bytes });
-    }
+    check_size(&header, options, &mut source)?;
 
     // Place the voxels in the world, which may fail, before reading them, which takes time.
     let unit_mm = options.unit_mm.unwrap_or_else(|| header_unit_mm(&header, &mut report));
     let (affine, form) =
         nifti::world_from_voxel(&header.fields, header.shape, unit_mm, options.assume_space, &mut report)?;
-    let grid = Grid::new(header.shape, affine).and_then(|grid| stored_grid(&grid));
+    let grid = match Grid::new(header.shape, affine).and_then(|grid| stored_grid(&grid)) {
+        Ok(grid) => Some(grid),
+        Err(GridError::Sheared { .. }) if !options.strict => None,
+        Err(problem) => return Err(ReadError::Grid { form, problem }),
+    };
 
-    if let Err(problem) = &grid {
-        let is_repairable = matches!(problem, GridError::Sheared { .. }) && !options.strict;
-        if !is_repairable {
-            return Err(ReadError::Grid { form, problem: problem.clone() });
-        }
-    }
-
-    // Read them, and on to the end.
-    skip_extensions(&mut source, &header, &mut report)?;
-    source.skip(index * volume_bytes)?;
-    let mut voxels = nifti::read_voxels(&mut source, &header, &mut report)?;
-    source.skip((header.n_volumes - 1 - index) * volume_bytes)?;
-    let n_trailing = source.drain(MAX_TRAILING_BYTES)?;
-    if n_trailing > 0 {
-        report.warn("W-NIFTI-TRAILING", format!("{n_trailing} bytes follow the voxels and are not read"));
-    }
-
-    // Bring sheared axes to orthogonal ones.
-    let grid = match grid {
-        Ok(grid) => grid,
-        Err(_) => {
-            let (grid, resampled) =
-                orthogonal::resample(&voxels, header.shape, affine, options.max_bytes, &mut report)?;
-            voxels = resampled;
-            grid
-        }
+    // Read them, and bring sheared axes to orthogonal ones.
+    let voxels = read_to_end(&mut source, &header, index, &mut report)?;
+    let (grid, voxels) = match grid {
+        Some(grid) => (grid, voxels),
+        None => orthogonal::resample(&voxels, header.shape, affine, options.max_bytes, &mut report)?,
     };
     count_grid(&grid, &mut report);
     let volume = Volume::new(grid, voxels, header.slope, header.intercept);
     Ok(Loaded { volume, report })
+}
+
+/// Compares the declared size with what the file can hold and with what the caller allows.
+fn check_size(header: &Header, options: &ReadOptions, source: &mut Source) -> Result<(), ReadError> {
+    let end = u128::from(header.volume_bytes()) * u128::from(header.n_volumes) + u128::from(header.offset);
+    source.expect(u64::try_from(end).unwrap_or(u64::MAX))?;
+    let needed = header.n_voxels() * header.scalar.memory_bytes();
+    if needed > options.max_bytes {
+        return Err(ReadError::TooLarge { needed, limit: options.max_bytes });
+    }
+    Ok(())
+}
+
+/// Reads one volume, and on to the end, so that the checksum is verified.
+fn read_to_end(
+    source: &mut Source,
+    header: &Header,
+    index: u64,
+    report: &mut Report,
+) -> Result<Voxels, ReadError> {
+    let has_hidden_extension = skip_extensions(source, header)?;
+    source.skip(index * header.volume_bytes())?;
+    let voxels = nifti::read_voxels(source, header, report)?;
+    source.skip((header.n_volumes - 1 - index) * header.volume_bytes())?;
+    let n_trailing = source.drain(MAX_TRAILING_BYTES)?;
+    if has_hidden_extension && n_trailing > 0 {
+        // The voxels would have been read from the middle of the extension.
+        let (field, expected) = ("vox_offset", "room for the extension that the header announces");
+        return Err(ReadError::Field { field, found: header.offset.to_string(), expected });
+    }
+    if n_trailing > 0 {
+        report.warn("W-NIFTI-TRAILING", format!("{n_trailing} bytes follow the voxels and are not read"));
+    }
+    Ok(voxels)
 }
 
 /// Which volume of the file is read.
@@ -123,19 +132,14 @@ fn header_unit_mm(header: &Header, report: &mut Report) -> f64 {
     }
 }
 
-/// Passes over what stands between header and voxels; nothing in it is needed.
-fn skip_extensions(source: &mut Source, header: &Header, report: &mut Report) -> Result<(), ReadError> {
+/// Passes over what stands between header and voxels; nothing in it is needed. Tells whether an extension is
+/// announced although the voxels are said to follow at once.
+fn skip_extensions(source: &mut Source, header: &Header) -> Result<bool, ReadError> {
     let mut flag = [0_u8; 4];
     source.take(&mut flag)?;
     let n_header_bytes = (N_HEADER_BYTES + flag.len()) as u64;
-    let has_extension = flag[0] != 0;
-    if has_extension && header.offset == n_header_bytes {
-        report.warn(
-            "W-NIFTI-EXTENSION",
-            "the header announces an extension, but leaves no room for it before the voxels",
-        );
-    }
-    source.skip(header.offset - n_header_bytes)
+    source.skip(header.offset - n_header_bytes)?;
+    Ok(flag[0] != 0 && header.offset == n_header_bytes)
 }
 
 fn count_grid(grid: &Grid, report: &mut Report) {

@@ -17,6 +17,8 @@ use crate::ReadError;
 /// least 2 bits.
 const MAX_RATIO: u64 = 1032;
 const BUFFER_BYTES: usize = 1 << 16;
+/// How far damage is looked for.
+const MAX_DAMAGE_BYTES: u64 = 64 << 20;
 
 /// A stream of decompressed bytes.
 pub(crate) struct Source {
@@ -54,7 +56,19 @@ impl Source {
     /// States how many bytes the file should have; refused if it cannot have as many.
     pub(crate) fn expect(&mut self, n_bytes: u64) -> Result<(), ReadError> {
         self.expected = n_bytes;
-        if n_bytes <= self.max_bytes { Ok(()) } else { Err(self.truncated(self.max_bytes)) }
+        match (n_bytes <= self.max_bytes, self.is_compressed) {
+            (true, _) => Ok(()),
+            (false, false) => Err(self.truncated(self.max_bytes)),
+            (false, true) => Err(ReadError::Overdeclared { expected: n_bytes, at_most: self.max_bytes }),
+        }
+    }
+
+    /// The damage of the compressed data behind a header that makes no sense, where there is any.
+    pub(crate) fn damage(&mut self) -> Option<ReadError> {
+        if !self.is_compressed {
+            return None;
+        }
+        self.drain(MAX_DAMAGE_BYTES).err().filter(|error| matches!(error, ReadError::Corrupt { .. }))
     }
 
     fn truncated(&self, found: u64) -> ReadError {

@@ -13,7 +13,7 @@ use nifti::NiftiHeader;
 
 use crate::{AssumedSpace, ReadError};
 
-/// Two affines that move no corner of the volume by more than this are the same.
+/// Two affines that put no corner of the volume farther apart than this are the same.
 const AGREE_MM: f64 = 0.01;
 /// How far b² + c² + d² may exceed 1 by rounding in other programs.
 const MAX_EXCESS: f64 = 1e-3;
@@ -115,9 +115,10 @@ fn warn_if_forms_disagree(
     let corner = |i: u32| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) * far;
     let distance = |i: u32| sform.transform_point3(corner(i)).distance(qform.transform_point3(corner(i)));
     let distance_mm = (0..8).map(distance).fold(0.0, f64::max);
+    let origins_mm = sform.translation.distance(qform.translation);
+    let turned_mm = (sform.matrix3 * far).length() * quaternion_rounding(fields);
     let is_mirrored = sform.matrix3.determinant() * qform.matrix3.determinant() < 0.0;
-    let extent_mm = (sform.matrix3 * far).length();
-    if is_mirrored || distance_mm > AGREE_MM + extent_mm * quaternion_rounding(fields) {
+    if is_mirrored || origins_mm > AGREE_MM || distance_mm > AGREE_MM + turned_mm {
         report.count("forms_disagree_mm", distance_mm);
         report.warn(
             "W-NIFTI-FORMS",

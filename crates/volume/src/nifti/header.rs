@@ -89,6 +89,11 @@ impl Header {
     pub(crate) fn n_voxels(&self) -> u64 {
         self.shape.iter().map(|&extent| extent as u64).product()
     }
+
+    /// Bytes of one volume in the file.
+    pub(crate) fn volume_bytes(&self) -> u64 {
+        self.n_voxels() * self.scalar.file_bytes()
+    }
 }
 
 /// Takes a header apart and checks it.

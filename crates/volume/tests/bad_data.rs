@@ -1,0 +1,190 @@
+//! Every file of the bad data: what it is read as, or which error it gives; and hostile bytes made here.
+#![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+#![allow(clippy::disallowed_methods, reason = "tests find their data through the environment")]
+
+use std::path::{Path, PathBuf};
+
+use espalier_geom::random::{Purpose, Stream};
+use espalier_model::Diagnose;
+use espalier_volume::{Error, ReadError, ReadOptions, read};
+
+/// Enough for every legal file of the data, too little for the bombs.
+const OPTIONS: ReadOptions =
+    ReadOptions { max_bytes: 16 << 20, volume_index: None, assume_space: None, unit_mm: None, strict: false };
+
+/// `shape orientation warnings`, or the error's code and exit code.
+fn outcome(path: &Path, options: &ReadOptions) -> String {
+    match read(path, options) {
+        Ok(loaded) => {
+            let grid = loaded.volume.grid();
+            let [nx, ny, nz] = grid.shape();
+            let warnings = loaded.report.warnings.iter().map(|warning| warning.code);
+            let words = [format!("{nx}x{ny}x{nz}"), grid.orientation()];
+            words.into_iter().chain(warnings.map(str::to_owned)).collect::<Vec<_>>().join(" ")
+        }
+        Err(error) => {
+            assert!(!error.hint().is_empty(), "{error} has no way out");
+            assert!(
+                error.to_string().ends_with(&path.display().to_string()),
+                "{error} does not end with the path"
+            );
+            format!("{} {}", error.code(), error.class().exit_code())
+        }
+    }
+}
+
+fn data() -> Option<PathBuf> {
+    let folder = std::env::var_os("ESPALIER_DATA").map(PathBuf::from);
+    if folder.is_none() {
+        println!("skipped: ESPALIER_DATA not set");
+    }
+    folder
+}
+
+/// The table is complete in both directions: every file has a line, every line a file.
+#[test]
+fn every_bad_file() {
+    let Some(data) = data() else { return };
+    let bad = data.join("bad");
+    let mut found: Vec<(String, String)> = Vec::new();
+    for folder in ["handmade/volumes", "nifti/nibabel", "nifti/nifti-rs", "nrrd/pynrrd"] {
+        for entry in std::fs::read_dir(bad.join(folder)).expect("a readable folder") {
+            let path = entry.expect("an entry").path();
+            let name = path.strip_prefix(&bad).expect("below").to_string_lossy().replace('\\', "/");
+            if folder.starts_with("nifti") || name.contains(".nii") {
+                found.push((name, outcome(&path, &OPTIONS)));
+            }
+        }
+    }
+    found.sort();
+    let found: String = found.iter().map(|(file, outcome)| format!("{file}\t{outcome}\n")).collect();
+    let expected: String = include_str!("bad_data.tsv")
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .map(|line| format!("{line}\n"))
+        .collect();
+    assert_eq!(found, expected, "left: found, right: expected");
+}
+
+fn scratch() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a folder for temporary files")
+}
+
+#[test]
+fn missing_folder_empty() {
+    let folder = scratch();
+    let path = |name: &str| folder.path().join(name);
+    std::fs::write(path("empty.nii.gz"), b"").expect("writable");
+    assert_eq!(outcome(&path("none.nii"), &OPTIONS), "E-VOLUME-IO 74");
+    assert_eq!(outcome(folder.path(), &OPTIONS), "E-VOLUME-NOT-A-FILE 74");
+    assert_eq!(outcome(&path("empty.nii.gz"), &OPTIONS), "E-VOLUME-EMPTY-FILE 3");
+}
+
+/// A small valid file: 9x8x7 16-bit numbers, 4x3 in the low bits.
+fn small_file() -> Vec<u8> {
+    use espalier_model::{Grid, Volume, Voxels, nifti_out};
+    let grid =
+        Grid::axis_aligned([9, 8, 7], glam::DVec3::new(0.5, 0.5, 2.0), glam::DVec3::ZERO).expect("legal");
+    let values = (0..9 * 8 * 7).map(|i: i32| (i * 37 % 1500 - 1000) as i16).collect();
+    let array = ndarray::Array3::from_shape_vec((7, 8, 9), values).expect("as many as voxels");
+    nifti_out::volume(&Volume::new(grid, Voxels::I16(array), 1.0, 0.0)).expect("fits")
+}
+
+fn decompressed(bytes: &[u8]) -> Vec<u8> {
+    let mut plain = Vec::new();
+    std::io::Read::read_to_end(&mut flate2::read::GzDecoder::new(bytes), &mut plain).expect("a gzip file");
+    plain
+}
+
+/// 1000 mutants each of a plain and a compressed file: none may panic, and none may yield more than the limit.
+#[test]
+fn mutants_never_panic() {
+    let folder = scratch();
+    let compressed = small_file();
+    let plain = decompressed(&compressed);
+    let options = ReadOptions { max_bytes: 1 << 20, ..OPTIONS };
+    let mut stream = Stream::new(11, Purpose::Test, 0, 0);
+    let (mut n_read, mut n_refused) = (0, 0);
+    for (name, original) in [("plain.nii", &plain), ("packed.nii.gz", &compressed)] {
+        let path = folder.path().join(name);
+        for _ in 0..1000 {
+            let mutant = mutate(original, &mut stream);
+            std::fs::write(&path, &mutant).expect("writable");
+            match read(&path, &options) {
+                Ok(loaded) => {
+                    n_read += 1;
+                    assert!(loaded.volume.grid().n_voxels() <= 1 << 20);
+                }
+                Err(Error::Read { problem, .. }) => {
+                    n_refused += 1;
+                    assert!(!matches!(problem, ReadError::Io(_)), "{problem} is no fault of the disk");
+                }
+                Err(error) => panic!("{error}"),
+            }
+        }
+    }
+    assert!(
+        n_read > 100 && n_refused > 100,
+        "{n_read} read, {n_refused} refused: too one-sided to test much"
+    );
+}
+
+/// Up to four changes: bytes set at random (mostly in the header) or to extremes, a piece cut out, the end cut.
+fn mutate(original: &[u8], stream: &mut Stream) -> Vec<u8> {
+    let mut bytes = original.to_vec();
+    for _ in 0..1 + stream.below(4) {
+        let n_bytes = bytes.len() as u32;
+        let at =
+            if stream.below(4) > 0 { stream.below(n_bytes.min(352)) } else { stream.below(n_bytes) } as usize;
+        match stream.below(8) {
+            0 => bytes.truncate((at + 300).min(bytes.len())),
+            1 => drop(bytes.drain(at..(at + 3).min(n_bytes as usize))),
+            2 => bytes[at] = 0xFF,
+            3 => bytes[at] = 0x7F,
+            4 => bytes[at] = 0,
+            _ => bytes[at] = stream.next_u32() as u8,
+        }
+        if bytes.len() < 2 {
+            break;
+        }
+    }
+    bytes
+}
+
+#[test]
+fn damage_is_told_from_truncation() {
+    let folder = scratch();
+    let path = folder.path().join("x.nii.gz");
+    let whole = small_file();
+    let outcome_of = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).expect("writable");
+        read(&path, &OPTIONS).map(|_| ()).map_err(|error| error.to_string())
+    };
+    assert_eq!(outcome_of(&whole), Ok(()));
+
+    // The last four bytes are the length, the four before them the checksum.
+    let mut bad_checksum = whole.clone();
+    let n_bytes = bad_checksum.len();
+    bad_checksum[n_bytes - 8] ^= 1;
+    assert!(outcome_of(&bad_checksum).is_err_and(|text| text.contains("damaged after 1360")));
+
+    let cut = outcome_of(&whole[..n_bytes / 2]).expect_err("cut short");
+    assert!(cut.contains("1360 bytes expected after decompression"), "{cut}");
+
+    let plain = decompressed(&whole);
+    let cut = outcome_of(&plain[..plain.len() - 1]).expect_err("cut short");
+    assert!(cut.contains("1360 bytes expected, 1359 found"), "{cut}");
+
+    // Content, not the name, says what is compressed; several members are one stream.
+    assert_eq!(outcome_of(&plain), Ok(()));
+    let member = |part: &[u8]| {
+        let mut gz = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        std::io::Write::write_all(&mut gz, part).expect("to memory");
+        gz.finish().expect("to memory")
+    };
+    assert_eq!(outcome_of(&[member(&plain[..700]), member(&plain[700..])].concat()), Ok(()));
+
+    // A legal stream that goes on far beyond the voxels.
+    let bomb = [plain.clone(), vec![0; 2 << 20]].concat();
+    assert!(outcome_of(&member(&bomb)).is_err_and(|text| text.contains("more than 1048576 bytes follow")));
+}
