@@ -159,6 +159,13 @@ impl CpuEnergy<'_> {
         (energy < limit).then_some(Score { energy, crossings })
     }
 
+    /// Whether a particle's layout has no crossing.
+    pub(crate) fn is_planar(&self, particle: &[f64], scratch: &mut Scratch) -> bool {
+        self.place(particle, scratch);
+        let Scratch { x, y, crossing: boxes, .. } = scratch;
+        crossing::count(self.problem, x, y, 0, boxes) == 0
+    }
+
     /// The positions of a particle's layout.
     pub(crate) fn positions(&self, particle: &[f64]) -> Vec<DVec2> {
         let mut scratch = Scratch::default();

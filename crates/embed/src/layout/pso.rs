@@ -9,8 +9,9 @@
 //! iteration). An evaluation stops once it cannot beat the particle's own best, which changes no result.
 //! **Differs from the source** P_g is the best ever, as the text says (the listing takes the best of the moment);
 //! ratios are clamped to their ranges. `pull = "subtree"`, ours: per iteration each particle draws one subtree for
-//! ω_g — that subtree, or all but that — and one for a pull ω_0 to the targets and for γ, so that what one subtree
-//! has found can be tried alone: a crossing elsewhere no longer spoils it.
+//! ω_g — that subtree, or all but that — and one subtree, segment or piece of a segment for a pull ω_0 to the
+//! targets and for γ, so that what one part of the tree has found can be tried alone: a crossing elsewhere no
+//! longer spoils it.
 //! **Cost** particles · iterations evaluations at most, 24 bytes per particle and ratio.
 
 use std::ops::Range;
@@ -21,7 +22,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use crate::Progress;
-use crate::batch::{BatchEnergy, CpuEnergy, DofMap, Score};
+use crate::batch::{BatchEnergy, CpuEnergy, DofMap, Score, Scratch};
 use crate::error::Error;
 use crate::layout::Layout;
 use crate::layout::start::{self, Incumbents, segments_below};
@@ -50,6 +51,16 @@ pub(crate) fn layout(
         radial: dofs.particle(problem, radial.0, radial.1),
         cone: dofs.particle(problem, cone.0, cone.1),
     };
+    // P_g ← P_0: where it has no crossing the loop has nothing to do.
+    let targets = vec![0.0; dofs.dims()];
+    if let Some(score) = energy.evaluate_one(&targets, f64::INFINITY, &mut Scratch::default())
+        && score.crossings == 0
+    {
+        let mut swarm = Swarm::new(start::Swarm::of(targets), dofs.dims());
+        swarm.evaluate(&energy);
+        swarm.record(0, params, progress);
+        return Ok(swarm.into_layout(name, &energy));
+    }
     let mut swarm = Swarm::new(start::start(&energy, &incumbents, params, seed), dofs.dims());
 
     // Algorithm 1: E_p of every particle, P_ig and P_g; then Eq. 5; until no loss is left or c reaches its limit.
@@ -63,12 +74,7 @@ pub(crate) fn layout(
         swarm.evaluate(&energy);
         swarm.record(iteration, params, progress);
     }
-    Ok(Layout {
-        name,
-        positions: energy.positions(&swarm.global_best),
-        evaluations: swarm.evaluations,
-        trace: swarm.trace,
-    })
+    Ok(swarm.into_layout(name, &energy))
 }
 
 fn name(params: &Params) -> String {
@@ -162,6 +168,11 @@ impl Swarm {
         });
     }
 
+    fn into_layout(self, name: String, energy: &CpuEnergy) -> Layout {
+        let positions = energy.positions(&self.global_best);
+        Layout { name, positions, evaluations: self.evaluations, trace: self.trace }
+    }
+
     fn record(&mut self, iteration: u32, params: &Params, progress: &(dyn Fn(Progress) + Sync)) {
         let Score { energy, crossings } = self.global_score;
         self.trace.push(TracePoint { iteration, evaluations: self.evaluations, energy, crossings });
@@ -211,20 +222,19 @@ fn step_subtree(
     let is_inside = stream.unit() < 0.5;
     for segment in 0..dofs.n_lengths {
         if taken.contains(&segment) == is_inside {
-            for_ratios(problem, dofs, segment..segment + 1, |dim| {
+            for dim in std::iter::once(segment).chain(angles_of(problem, dofs, segment..segment + 1)) {
                 p[dim] += params.omega_g * (global[dim] - p[dim]);
-            });
+            }
         }
     }
-    // In another, go towards the targets and a random step beside.
-    let moved = draw_subtree(problem, stream);
+    // In another, or in a piece of a segment, go towards the targets, with a random step beside.
     let share = params.omega_target * 2.0 * stream.unit();
     let width = params.omega_inertia * stream.unit() * stream.unit();
-    for_ratios(problem, dofs, moved, |dim| {
+    for dim in draw_move(problem, dofs, stream).into_iter().flatten() {
         let (low, high) = dofs.range(dim);
         let gamma = stream.uniform(-1.0, 1.0);
         p[dim] = (p[dim] * (1.0 - share) + width * (u[dim] + gamma)).clamp(low, high);
-    });
+    }
     for dim in 0..p.len() {
         u[dim] = p[dim] - old[dim];
     }
@@ -233,17 +243,25 @@ fn step_subtree(
 /// One random subtree, as a range of segments; often small, sometimes a single segment.
 fn draw_subtree(problem: &Problem, stream: &mut Stream) -> Range<usize> {
     let top = stream.below(problem.branches.list().len() as u32) as usize;
-    if stream.unit() < 0.5 { top..top + 1 } else { segments_below(problem, top) }
+    if stream.unit() < 0.75 { top..top + 1 } else { segments_below(problem, top) }
 }
 
-/// Calls `act` for every ratio of a range of segments.
-fn for_ratios(problem: &Problem, dofs: &DofMap, segments: Range<usize>, mut act: impl FnMut(usize)) {
+/// The ratios of a subtree, of a segment, or of a piece of a segment: lengths, then angles.
+fn draw_move(problem: &Problem, dofs: &DofMap, stream: &mut Stream) -> [Range<usize>; 2] {
+    let segments = draw_subtree(problem, stream);
+    let angles = angles_of(problem, dofs, segments.clone());
+    let is_piece = segments.len() == 1 && angles.len() > 1 && stream.unit() < 0.7;
+    if !is_piece {
+        return [segments, angles];
+    }
+    let mut ends = [0, 0].map(|_: u32| angles.start + stream.below(angles.len() as u32) as usize);
+    ends.sort_unstable();
+    [0..0, ends[0]..ends[1] + 1]
+}
+
+/// The angle ratios of a range of segments.
+fn angles_of(problem: &Problem, dofs: &DofMap, segments: Range<usize>) -> Range<usize> {
     let list = problem.branches.list();
-    let angles = dofs.angle[list[segments.start].nodes.start]..=dofs.angle[list[segments.end - 1].end()];
-    for segment in segments {
-        act(segment);
-    }
-    for dim in angles {
-        act(dim as usize);
-    }
+    let first = dofs.angle[list[segments.start].nodes.start] as usize;
+    first..dofs.angle[list[segments.end - 1].end()] as usize + 1
 }

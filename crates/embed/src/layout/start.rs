@@ -3,13 +3,13 @@
 //! **Input** the problem and its crossing-free layouts as particles. **Output** ratios and velocities of n
 //! particles, shape (n, dims).
 //! **Steps** `paper`: P_0 = 0, P_1 = radial, the rest and all velocities uniform over the ranges.
-//! `relaxed`: P_0 = 0, P_1 = radial, P_2 = cone. The next few *relax* the cone: they visit the segments in an
-//! order of their own and put each segment's ratios to zero, or half way, where no crossing appears. The rest
-//! blend the cone towards zero by a factor of their own, with other factors in random subtrees.
+//! `relaxed`: P_0 = 0, P_1 = radial, P_2 = cone. The next few *relax* the cone: they visit the segments again and
+//! again, in an order of their own, and bring each segment's angle ratios as near to zero as is free of crossings.
+//! The rest are copies of these with a few subtrees sent part of the way back to the cone.
 //! Why not the paper's start? On a tree of a few hundred segments every random particle crosses itself hundreds of
 //! times, and a small swarm never gets out of that.
-//! **Guarantees** numbers depend on (seed, particle) only. **Cost** relaxing takes at most a quarter of the swarm's
-//! evaluations.
+//! **Guarantees** numbers depend on (seed, particle) only. **Cost** relaxing takes half as many
+//! evaluations as the iterations, at most.
 
 use espalier_geom::random::{Purpose, Stream};
 use rayon::prelude::*;
@@ -17,6 +17,13 @@ use rayon::prelude::*;
 use crate::batch::{CpuEnergy, DofMap, Scratch};
 use crate::params::{Params, Start};
 use crate::problem::Problem;
+
+/// Relaxing may take the swarm's evaluations divided by this.
+const RELAXING_SHARE: u64 = 2;
+/// What counts as enough evaluations for one relaxing particle, in segments.
+const SWEEPS: u64 = 12;
+/// What is tried for the ratios of a segment, as shares of what they are.
+const SHARES: [f64; 4] = [0.0, 0.3, 0.6, 0.85];
 
 /// Feasible starts as particles.
 pub(crate) struct Incumbents {
@@ -32,6 +39,13 @@ pub(crate) struct Swarm {
     pub(crate) velocities: Vec<f64>,
     /// Evaluations spent on the start.
     pub(crate) evaluations: u64,
+}
+
+impl Swarm {
+    /// One particle at rest.
+    pub(crate) fn of(ratios: Vec<f64>) -> Self {
+        Self { velocities: vec![0.0; ratios.len()], ratios, evaluations: 0 }
+    }
 }
 
 /// The swarm's start.
@@ -62,67 +76,69 @@ fn paper(dofs: &DofMap, incumbents: &Incumbents, params: &Params, seed: u64) -> 
 }
 
 fn relaxed(energy: &CpuEnergy, incumbents: &Incumbents, params: &Params, seed: u64) -> Swarm {
-    let (problem, dofs) = (energy.problem, energy.dofs);
-    let dims = dofs.dims();
-    let n_relaxed = n_relaxed(problem, params);
+    let dims = energy.dofs.dims();
+    let stream = |particle: usize| Stream::new(seed, Purpose::SwarmStart, particle as u32, 0);
     let mut ratios = vec![0.0; params.particles as usize * dims];
-    let evaluations: Vec<u64> = ratios
+    ratios[dims..2 * dims].copy_from_slice(&incumbents.radial);
+    ratios[2 * dims..3 * dims].copy_from_slice(&incumbents.cone);
+
+    let (n_relaxed, budget) = relaxing_work(energy.problem, params);
+    let (relaxed, others) = ratios[3 * dims..].split_at_mut(n_relaxed * dims);
+    let evaluations: Vec<u64> = relaxed
         .par_chunks_mut(dims)
         .enumerate()
-        .map(|(particle, ratios)| {
-            let mut stream = Stream::new(seed, Purpose::SwarmStart, particle as u32, 0);
-            match particle {
-                0 => return 0,
-                1 => ratios.copy_from_slice(&incumbents.radial),
-                2 => ratios.copy_from_slice(&incumbents.cone),
-                _ if particle < 3 + n_relaxed => {
-                    ratios.copy_from_slice(&incumbents.cone);
-                    return relax(energy, ratios, particle - 3, &mut stream);
-                }
-                _ => blend(problem, dofs, &incumbents.cone, ratios, &mut stream),
-            }
-            0
+        .map(|(rank, ratios)| {
+            ratios.copy_from_slice(&incumbents.cone);
+            relax(energy, ratios, budget, &mut stream(3 + rank))
         })
         .collect();
+    others.par_chunks_mut(dims).enumerate().for_each(|(rank, ratios)| {
+        let like = rank % n_relaxed * dims..(rank % n_relaxed + 1) * dims;
+        ratios.copy_from_slice(&relaxed[like]);
+        blend(energy.problem, energy.dofs, &incumbents.cone, ratios, &mut stream(3 + n_relaxed + rank));
+    });
     Swarm { velocities: vec![0.0; ratios.len()], ratios, evaluations: evaluations.iter().sum() }
 }
 
-/// How many particles can relax within a quarter of the swarm's evaluations.
-fn n_relaxed(problem: &Problem, params: &Params) -> usize {
-    let budget = u64::from(params.particles) * u64::from(params.iterations) / 4;
-    let each = 2 * problem.branches.list().len() as u64;
-    (budget / each.max(1)).min(u64::from(params.particles) - 3) as usize
+/// How many particles relax, and how many evaluations each may take.
+fn relaxing_work(problem: &Problem, params: &Params) -> (usize, u64) {
+    let total = u64::from(params.particles) * u64::from(params.iterations) / RELAXING_SHARE;
+    let enough = SWEEPS * problem.branches.list().len() as u64;
+    let n_relaxed = (total / enough.max(1)).clamp(2, 16).min(u64::from(params.particles) - 3);
+    (n_relaxed as usize, total / n_relaxed.max(1))
 }
 
-/// Puts the ratios of one segment after the other to zero, or half way, where that is free of crossings.
-fn relax(energy: &CpuEnergy, ratios: &mut [f64], rank: usize, stream: &mut Stream) -> u64 {
+/// Puts the ratios of one segment after the other nearer to zero, as far as that is free of crossings.
+fn relax(energy: &CpuEnergy, ratios: &mut [f64], budget: u64, stream: &mut Stream) -> u64 {
     let (problem, dofs) = (energy.problem, energy.dofs);
     let mut order: Vec<usize> = (0..problem.branches.list().len()).collect();
-    match rank {
-        0 => order.reverse(),
-        1 => {}
-        _ => shuffle(&mut order, stream),
-    }
     let mut scratch = Scratch::default();
-    let mut evaluations = 0;
+    let (mut evaluations, mut is_moving) = (0, true);
     let mut kept: Vec<f64> = Vec::new();
-    for segment in order {
-        let dims = segment_angles(problem, dofs, segment);
-        kept.clear();
-        kept.extend_from_slice(&ratios[dims.clone()]);
-        if kept.iter().all(|&ratio| ratio == 0.0) {
-            continue;
-        }
-        for share in [0.0, 0.5] {
-            for (ratio, old) in ratios[dims.clone()].iter_mut().zip(&kept) {
-                *ratio = share * old;
+    while is_moving {
+        is_moving = false;
+        shuffle(&mut order, stream);
+        for &segment in &order {
+            let dims = segment_angles(problem, dofs, segment);
+            kept.clear();
+            kept.extend_from_slice(&ratios[dims.clone()]);
+            if kept.iter().all(|&ratio| ratio == 0.0) {
+                continue;
             }
-            evaluations += 1;
-            // Below the price of one crossing there is none.
-            if energy.evaluate_one(ratios, problem.crossing_weight, &mut scratch).is_some() {
-                break;
+            for share in SHARES {
+                if evaluations == budget {
+                    return evaluations;
+                }
+                for (ratio, old) in ratios[dims.clone()].iter_mut().zip(&kept) {
+                    *ratio = share * old;
+                }
+                evaluations += 1;
+                if energy.is_planar(ratios, &mut scratch) {
+                    is_moving = true;
+                    break;
+                }
+                ratios[dims.clone()].copy_from_slice(&kept);
             }
-            ratios[dims.clone()].copy_from_slice(&kept);
         }
     }
     evaluations
@@ -140,19 +156,15 @@ fn segment_angles(problem: &Problem, dofs: &DofMap, segment: usize) -> std::ops:
     dofs.angle[nodes.start] as usize..dofs.angle[nodes.end - 1] as usize + 1
 }
 
-/// The cone times a factor, with other factors in random subtrees.
+/// Sends a few random subtrees part of the way to the cone.
 fn blend(problem: &Problem, dofs: &DofMap, cone: &[f64], ratios: &mut [f64], stream: &mut Stream) {
-    let n_segments = problem.branches.list().len();
-    let mut factor = vec![stream.unit(); n_segments];
-    for _ in 0..1 + stream.below(2 + n_segments as u32 / 8) {
-        let top = stream.below(n_segments as u32) as usize;
-        let value = stream.unit();
-        factor[segments_below(problem, top)].fill(value);
-    }
-    ratios.copy_from_slice(cone);
-    for (segment, factor) in factor.into_iter().enumerate() {
-        for ratio in &mut ratios[segment_angles(problem, dofs, segment)] {
-            *ratio *= factor;
+    let n_segments = problem.branches.list().len() as u32;
+    for _ in 0..1 + stream.below(3) {
+        let share = stream.unit();
+        for segment in segments_below(problem, stream.below(n_segments) as usize) {
+            for dim in segment_angles(problem, dofs, segment) {
+                ratios[dim] += share * (cone[dim] - ratios[dim]);
+            }
         }
     }
 }
