@@ -1,0 +1,298 @@
+//! One round cone: the hull of two spheres, seen from above.
+//!
+//! **Input** two spheres in pixels (x right, y down, z towards the viewer). **Output** at any pixel the height of
+//! the surface, the place along the axis, and the signed distance to the outline.
+//! **Notation** a, b centres; r_a, r_b radii; L length, u unit axis, m = |u_xy|, k = (r_b − r_a)/L;
+//! w = p − a_xy, x = w · u_xy/m.
+//! **Steps** The hull is the union of the spheres c(s) = a + s u, r(s) = r_a + k s, 0 ≤ s ≤ L. Above p the sphere
+//! s reaches z(s) = a_z + s u_z + √g(s), g(s) = r(s)² − |w − s u_xy|² = −A s² + 2 B s + C with A = m² − k²,
+//! B = r_a k + m x, C = r_a² − |w|². √g is concave where B² + A C > 0, so z(s) has one peak,
+//! s* = (B + u_z q)/A, q = √((B² + A C)/(1 − k²)), clamped to [0, L]. A flat cone has u_z = 0, s* = B/A, and is
+//! then exactly z = √(r² − d²) over its centreline when it does not taper.
+//! **Guarantees** only basic arithmetic and square roots: the same bits on every machine.
+//! **Cost** O(1) for a pixel.
+
+use glam::{DVec3, Vec2, Vec3};
+
+/// Below this tilt a cone counts as flat.
+const FLAT: f32 = 1e-6;
+
+/// A sphere at a node, in pixels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ball {
+    /// Centre.
+    pub center: DVec3,
+    /// Radius, over 0.
+    pub radius: f64,
+}
+
+/// A round cone in pixels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cone {
+    start: Vec3,
+    end: Vec3,
+    radii: [f32; 2],
+    /// Unit axis in the picture plane; (1, 0) where the cone points at the viewer.
+    along: Vec2,
+    /// The share of the length that is seen, and the signed share towards the viewer.
+    m: f32,
+    uz: f32,
+    length: f32,
+    k: f32,
+    /// The range of x that this cone must fill; beyond it another cone of the chain does.
+    range: [f32; 2],
+}
+
+/// A place on a cone.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Hit {
+    /// Height of the surface towards the viewer.
+    pub z: f32,
+    /// Height of the surface over the axis; 0 just outside the outline.
+    pub height: f32,
+    /// From the axis point to the pixel.
+    pub offset: Vec2,
+    /// The radius there.
+    pub radius: f32,
+    /// The place along the axis: 0 at the start, 1 at the end.
+    pub share: f32,
+    /// Distance to the outline, negative inside.
+    pub outside: f32,
+}
+
+impl Hit {
+    /// The unit normal, towards the viewer.
+    pub(crate) fn normal(&self) -> Vec3 {
+        self.offset.extend(self.height).normalize_or(Vec3::Z)
+    }
+}
+
+impl Cone {
+    /// The cone from `start` to `end`. `reach` says how far it must go on beyond either end, in radii: 1 at tips
+    /// and forks, less where the chain goes on nearly straight (see [`reach_at_joint`]).
+    pub(crate) fn new(start: Ball, end: Ball, reach: [f64; 2]) -> Self {
+        let axis = end.center - start.center;
+        let length = axis.length();
+        let unit = if length > 0.0 { axis / length } else { DVec3::Z };
+        let seen = unit.truncate().length();
+        let along = if seen > 1e-9 { unit.truncate() / seen } else { glam::DVec2::X };
+        let k = if length > 0.0 { (end.radius - start.radius) / length } else { 0.0 };
+        // The surface at axis place s lies at x = s m − k r, shifted by up to |u_z| r where the axis is tilted:
+        // this much on either side of an end even where the chain goes straight on.
+        let lean = |radius: f64| (k.abs() + unit.z.abs()).min(1.0) * radius + 1.0;
+        let slack = |radius: f64, reach: f64| (reach + k.abs() + unit.z.abs()).min(1.0) * radius + 1.0;
+        let range = [
+            (-slack(start.radius, reach[0])).min(length * seen - lean(end.radius)),
+            (length * seen + slack(end.radius, reach[1])).max(lean(start.radius)),
+        ];
+        Self {
+            start: start.center.as_vec3(),
+            end: end.center.as_vec3(),
+            radii: [start.radius as f32, end.radius as f32],
+            along: along.as_vec2(),
+            m: seen as f32,
+            uz: unit.z as f32,
+            length: length as f32,
+            k: k as f32,
+            range: range.map(|bound| bound as f32),
+        }
+    }
+
+    /// The box that holds the cone: low and high corner.
+    pub(crate) fn bounds(&self) -> (Vec2, Vec2) {
+        let (a, b) = (self.start.truncate(), self.end.truncate());
+        ((a - self.radii[0]).min(b - self.radii[1]), (a + self.radii[0]).max(b + self.radii[1]))
+    }
+
+    /// The pixels x of a row at height `y` that the cone can reach when it is `margin` wider: low and high.
+    pub(crate) fn span(&self, y: f32, margin: f32) -> Option<(f32, f32)> {
+        let (low, high) = self.bounds();
+        let mut span = (low.x - margin, high.x + margin);
+        let wide = self.radii[0].max(self.radii[1]) + margin;
+        let across = Vec2::new(-self.along.y, self.along.x);
+        let rel_y = y - self.start.y;
+        // along · (x, y) within the range, across · (x, y) within the width: two strips cut by the row.
+        for (normal, [from, to]) in [(self.along, self.range), (across, [-wide, wide])] {
+            if normal.x.abs() < 1e-4 {
+                let at = normal.y * rel_y;
+                // The row runs nearly along the strip: a pixel of slack covers the tilt over any page.
+                if at < from - 4.0 || at > to + 4.0 {
+                    return None;
+                }
+                continue;
+            }
+            let cut = |bound: f32| self.start.x + (bound - normal.y * rel_y) / normal.x;
+            let (p, q) = (cut(from), cut(to));
+            span = (span.0.max(p.min(q)), span.1.min(p.max(q)));
+        }
+        (span.0 <= span.1).then_some(span)
+    }
+
+    /// The cone at a pixel; `None` where it is more than `margin` outside its outline, or another's to fill.
+    pub(crate) fn at(&self, pixel: Vec2, margin: f32) -> Option<Hit> {
+        let w = pixel - self.start.truncate();
+        let x = w.dot(self.along);
+        if x < self.range[0] || x > self.range[1] {
+            return None;
+        }
+        let outside = self.outside(pixel, w, x);
+        if outside > margin {
+            return None;
+        }
+        let s = self.peak(w, x);
+        let center = self.start.truncate() + self.along * (s * self.m);
+        let offset = pixel - center;
+        let radius = self.radii[0] + self.k * s;
+        let height = (radius * radius - offset.length_squared()).max(0.0).sqrt();
+        let share = if self.length > 0.0 { s / self.length } else { 0.0 };
+        Some(Hit { z: self.start.z + s * self.uz + height, height, offset, radius, share, outside })
+    }
+
+    /// The signed distance to the outline: of the hull of two discs, or of the larger if it holds the other.
+    fn outside(&self, pixel: Vec2, w: Vec2, x: f32) -> f32 {
+        let from_start = || w.length() - self.radii[0];
+        let from_end = || (pixel - self.end.truncate()).length() - self.radii[1];
+        let seen = self.length * self.m;
+        let taper = self.radii[1] - self.radii[0];
+        if taper.abs() >= seen {
+            return from_start().min(from_end());
+        }
+        let sin = taper / seen;
+        let cos = (1.0 - sin * sin).sqrt();
+        let y = w.perp_dot(self.along).abs();
+        let tangent = x * cos + y * sin;
+        if tangent < 0.0 {
+            from_start()
+        } else if tangent > seen * cos {
+            from_end()
+        } else {
+            y * cos - x * sin - self.radii[0]
+        }
+    }
+
+    /// s*: the place along the axis whose sphere is highest above the pixel.
+    fn peak(&self, w: Vec2, x: f32) -> f32 {
+        let Self { radii: [radius, _], m, uz, length, k, .. } = *self;
+        let a = m * m - k * k;
+        let b = radius * k + m * x;
+        if uz.abs() < FLAT && a > 0.0 {
+            return (b / a).clamp(0.0, length);
+        }
+        let c = radius * radius - w.length_squared();
+        let under = b * b + a * c;
+        let e = 1.0 - k * k;
+        let inner = if e > 0.0 && under >= 0.0 {
+            let q = (under / e).sqrt();
+            // Two forms of the same root; the second survives A → 0, where the axis points at the viewer.
+            let other = e * (b - uz * q);
+            if a.abs() > 0.05 {
+                (b + uz * q) / a
+            } else if other != 0.0 {
+                (b * b - uz * uz * c) / other
+            } else {
+                0.0
+            }
+        } else {
+            0.0
+        };
+        if a > 0.05 {
+            return inner.clamp(0.0, length);
+        }
+        // Nearly end on, g may be positive on two stretches: ask the ends too.
+        let top = |s: f32| {
+            let g = (radius + k * s) * (radius + k * s) - (w - self.along * (s * m)).length_squared();
+            if g >= 0.0 { s * uz + g.sqrt() } else { f32::NEG_INFINITY }
+        };
+        [inner.clamp(0.0, length), 0.0, length]
+            .into_iter()
+            .reduce(|p, q| if top(q) > top(p) { q } else { p })
+            .unwrap_or(0.0)
+    }
+}
+
+/// How far, in radii, two cones must reach beyond the joint of a chain that they share: tan(turn/2) fills the
+/// wedge on the outer side, the change of taper moves the borders of their surfaces.
+pub(crate) fn reach_at_joint(before: Ball, joint: Ball, after: Ball) -> f64 {
+    let (p, q) = (joint.center - before.center, after.center - joint.center);
+    let (p_length, q_length) = (p.length(), q.length());
+    if p_length == 0.0 || q_length == 0.0 {
+        return 1.0;
+    }
+    let cos = p.dot(q) / (p_length * q_length);
+    if cos <= 0.0 {
+        return 1.0;
+    }
+    // tan(turn/2) = √((1 − cos)/(1 + cos)).
+    let tan_half = ((1.0 - cos).max(0.0) / (1.0 + cos)).sqrt();
+    let taper_change = (after.radius - joint.radius) / q_length - (joint.radius - before.radius) / p_length;
+    (tan_half + taper_change.abs()).min(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ball(x: f64, y: f64, z: f64, radius: f64) -> Ball {
+        Ball { center: DVec3::new(x, y, z), radius }
+    }
+
+    /// The slow form: the highest of many spheres along the axis.
+    fn highest_sphere(start: Ball, end: Ball, pixel: Vec2) -> Option<f64> {
+        let n = 20_000;
+        (0..=n)
+            .filter_map(|i| {
+                let s = f64::from(i) / f64::from(n);
+                let center = start.center.lerp(end.center, s);
+                let radius = start.radius + s * (end.radius - start.radius);
+                let g = radius * radius - (pixel.as_dvec2() - center.truncate()).length_squared();
+                (g >= 0.0).then(|| center.z + g.sqrt())
+            })
+            .max_by(f64::total_cmp)
+    }
+
+    #[test]
+    fn height_is_the_highest_sphere() {
+        let cases = [
+            (ball(10.0, 10.0, 0.0, 4.0), ball(30.0, 18.0, 0.0, 4.0)),
+            (ball(10.0, 10.0, 0.0, 6.0), ball(30.0, 18.0, 0.0, 2.0)),
+            (ball(10.0, 10.0, -3.0, 3.0), ball(26.0, 20.0, 9.0, 5.0)),
+            (ball(20.0, 15.0, -9.0, 6.0), ball(20.5, 15.2, 9.0, 3.0)),
+            (ball(20.0, 15.0, 0.0, 2.0), ball(21.0, 15.0, 0.0, 7.0)),
+            (ball(20.0, 15.0, 4.0, 5.0), ball(20.0, 15.0, -8.0, 5.0)),
+        ];
+        for (start, end) in cases {
+            let cone = Cone::new(start, end, [1.0, 1.0]);
+            let mut n_inside = 0;
+            for y in 0..30 {
+                for x in 0..45 {
+                    let pixel = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+                    let hit = cone.at(pixel, 0.0);
+                    let Some(expected) = highest_sphere(start, end, pixel) else {
+                        assert!(hit.is_none_or(|hit| hit.outside > -0.01), "{start:?} {end:?} {pixel}");
+                        continue;
+                    };
+                    n_inside += 1;
+                    if let Some(hit) = hit {
+                        let rim = hit.outside > -0.05;
+                        assert!(
+                            rim || (f64::from(hit.z) - expected).abs() < 2e-2,
+                            "{pixel} {hit:?} {expected}"
+                        );
+                    }
+                    let (from, to) = cone.span(pixel.y, 0.0).expect("a row inside");
+                    assert!(from <= pixel.x && pixel.x <= to, "{pixel} outside {from}..{to}");
+                }
+            }
+            assert!(n_inside > 20);
+        }
+    }
+
+    #[test]
+    fn outline_distance_is_right() {
+        let cone = Cone::new(ball(10.0, 10.0, 0.0, 4.0), ball(30.0, 10.0, 0.0, 4.0), [1.0, 1.0]);
+        let outside = |x: f32, y: f32| cone.at(Vec2::new(x, y), 5.0).expect("near").outside;
+        assert!((outside(20.0, 10.0) + 4.0).abs() < 1e-5);
+        assert!((outside(20.0, 15.0) - 1.0).abs() < 1e-5);
+        assert!((outside(34.5, 10.0) - 0.5).abs() < 1e-5);
+    }
+}

@@ -1,0 +1,75 @@
+//! What the headings say: the verdict, the method, the losses, the tree.
+
+use espalier_model::{Branches, Embedding, Tree, View};
+
+use crate::furniture::Heading;
+use crate::params::Params;
+use crate::unit::{self, LengthUnit};
+
+/// The heading of the map.
+pub(crate) fn planar(tree: &Tree, branches: &Branches, embedding: &Embedding, params: &Params) -> Heading {
+    let losses = &embedding.losses;
+    let verdict = vec![
+        verdict(embedding),
+        format!("method {}", embedding.method),
+        format!(
+            "length loss mean {}, max {}",
+            percent(losses.length_loss_mean),
+            percent(losses.length_loss_max)
+        ),
+        format!(
+            "angle error in 3D mean {}, max {}",
+            degrees(losses.angle3d_error_mean_deg),
+            degrees(losses.angle3d_error_max_deg)
+        ),
+    ];
+    let mut facts = size_of(tree, branches, params);
+    facts.push("a map, not a projection: lengths and bends are true, directions are not".to_owned());
+    Heading { title: params.title.clone(), verdict, facts }
+}
+
+/// The heading of the global view.
+pub(crate) fn global(tree: &Tree, branches: &Branches, view: &View, params: &Params) -> Heading {
+    let title = params.title.as_ref().map(|title| format!("{title}: in space"));
+    let verdict = vec![
+        "the tree in space, from its best single view".to_owned(),
+        format!("view loss {:.3}", view.loss),
+    ];
+    let mut facts = size_of(tree, branches, params);
+    facts.push("an orthographic projection: branches may hide and shorten each other".to_owned());
+    Heading { title, verdict, facts }
+}
+
+/// `crossings 0 (certified)`, or how many there are.
+pub(crate) fn verdict(embedding: &Embedding) -> String {
+    if embedding.certificate.holds() {
+        "crossings 0 (certified)".to_owned()
+    } else {
+        format!("crossings {} (not certified)", embedding.certificate.crossings)
+    }
+}
+
+fn size_of(tree: &Tree, branches: &Branches, params: &Params) -> Vec<String> {
+    let length_mm = tree.length_mm();
+    let unit = LengthUnit::choose(params.unit, length_mm);
+    let counted = |n: usize, one: &str, many: &str| format!("{n} {}", if n == 1 { one } else { many });
+    let mut parts = vec![
+        counted(branches.list().len(), "branch", "branches"),
+        counted(tree.n_tips(), "tip", "tips"),
+        format!("length {} {}", unit::text(length_mm / unit.mm, 4), unit.sign),
+    ];
+    let mean_mm = tree.mean_radius_mm();
+    if mean_mm > 0.0 {
+        let unit = LengthUnit::choose(params.unit, mean_mm);
+        parts.push(format!("mean radius {} {}", unit::text(mean_mm / unit.mm, 3), unit.sign));
+    }
+    parts
+}
+
+fn percent(share: f64) -> String {
+    if share.is_finite() { format!("{:.1} %", 100.0 * share) } else { "unknown".to_owned() }
+}
+
+fn degrees(angle: f64) -> String {
+    if angle.is_finite() { format!("{angle:.1}°") } else { "unknown".to_owned() }
+}

@@ -1,0 +1,160 @@
+//! The parameters of the pictures.
+
+use espalier_model::diagnose::ParamError;
+use serde::{Deserialize, Serialize};
+
+/// How the branches are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Style {
+    /// Lit round cones between the radii of the nodes (section 4.1 of [Hu2022]).
+    #[default]
+    PseudoSurface,
+    /// The bare skeleton as lines of one width.
+    Line,
+}
+
+/// The background and the ink.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Theme {
+    /// Dark ink on white, for paper.
+    #[default]
+    Light,
+    /// Light ink on near-black, for a reading room and slides.
+    Dark,
+}
+
+/// What the colours mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ColorBy {
+    /// The radius at each place against the mean radius of the tree.
+    #[default]
+    Radius,
+    /// The mean radius of each branch against the mean radius of the tree, one colour a branch, as the paper does.
+    BranchRadius,
+    /// The number of forks between the root and the branch.
+    Generation,
+    /// One colour a branch, unlike its parent's and its neighbours', to find a branch in both pictures.
+    Branch,
+    /// By how many degrees the angle at the edge's upper node differs from its target.
+    AngleLoss,
+    /// By what share the length of the edge differs from its target.
+    LengthLoss,
+}
+
+/// The unit of the scale bar and of the radii.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Unit {
+    /// The unit in which the number is easiest to read.
+    #[default]
+    Auto,
+    /// Metres.
+    M,
+    /// Centimetres.
+    Cm,
+    /// Millimetres.
+    Mm,
+    /// Micrometres.
+    Um,
+    /// Nanometres.
+    Nm,
+}
+
+/// The letters at the edges of the global view.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Compass {
+    /// R L A P S I: right, left, anterior, posterior, superior, inferior of the patient.
+    #[default]
+    Anatomical,
+    /// +x −x +y −y +z −z, for data without a body, such as a neuron in a slice.
+    Axes,
+    /// No letters.
+    None,
+}
+
+/// The parameters of the pictures.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Params {
+    /// Width of the pictures in pixels, 160 to 16384; the height follows from the shape of the tree. Default
+    /// 1600: fills a screen, and prints 13.5 cm wide at 300 dpi. Larger shows finer branches and takes longer.
+    pub width_px: u32,
+    /// How the branches are drawn. Default the pseudo-surface.
+    pub style: Style,
+    /// Background and ink. Default light, for paper.
+    pub theme: Theme,
+    /// What the colours mean. Default the radius, as in the paper.
+    pub color_by: ColorBy,
+    /// The heading; none by default. Longer ones are broken into lines.
+    pub title: Option<String>,
+    /// Factor on every drawn radius, over 0 to 100. Default 1: true calibres. Larger makes thin trees easier to
+    /// see, and lets neighbours overlap sooner. Colours and the EXR's `radius` keep the true values.
+    pub width_scale: f64,
+    /// The least width of a branch in pixels, 0.5 to 100; the width of every branch in the line style. Default 2:
+    /// visible on screen and in print. Larger makes thin branches easier to see and hides their differences.
+    pub min_width_px: f64,
+    /// Unit of the scale bar and of the radii. Default automatic.
+    pub unit: Unit,
+    /// Letters at the edges of the global view. Default anatomical, which is right for scans.
+    pub compass: Compass,
+    /// Whether to make the EXR with its layers. Default true; it is the largest of the files.
+    pub exr: bool,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            width_px: 1600,
+            style: Style::PseudoSurface,
+            theme: Theme::Light,
+            color_by: ColorBy::Radius,
+            title: None,
+            width_scale: 1.0,
+            min_width_px: 2.0,
+            unit: Unit::Auto,
+            compass: Compass::Anatomical,
+            exr: true,
+        }
+    }
+}
+
+impl Params {
+    /// The paper's pictures (section 4.1 of [Hu2022]): one colour a branch, by its mean radius.
+    #[must_use]
+    pub fn paper() -> Self {
+        Self { color_by: ColorBy::BranchRadius, ..Self::default() }
+    }
+
+    /// Checks every range.
+    ///
+    /// # Errors
+    /// The first key outside its range.
+    pub fn validate(&self) -> Result<(), ParamError> {
+        let Self { width_px, width_scale, min_width_px, .. } = *self;
+        ParamError::check(
+            "width_px",
+            (160..=16_384).contains(&width_px),
+            format!("must be 160 to 16384 pixels, is {width_px}"),
+        )?;
+        ParamError::check(
+            "width_scale",
+            width_scale > 0.0 && width_scale <= 100.0,
+            format!("must be over 0 and at most 100, is {width_scale}"),
+        )?;
+        ParamError::check(
+            "min_width_px",
+            (0.5..=100.0).contains(&min_width_px),
+            format!("must be 0.5 to 100 pixels, is {min_width_px}"),
+        )?;
+        let title_chars = self.title.as_ref().map_or(0, |title| title.chars().count());
+        ParamError::check(
+            "title",
+            title_chars <= 500,
+            format!("must be at most 500 characters, is {title_chars}"),
+        )
+    }
+}

@@ -1,0 +1,85 @@
+//! The tree as it stands before the picture: flat, or in space as the global view sees it.
+//!
+//! **Input** a tree with its embedding or its global view. **Output** a point (x to the right, y up, z towards the
+//! viewer, mm) and a drawn radius for each node.
+
+use espalier_geom::math;
+use espalier_model::{Embedding, Tree, View};
+use glam::{DVec2, DVec3};
+
+use crate::Error;
+
+/// The largest coordinate that leaves room for squares in `f32` pixels, in mm: a million kilometres.
+const FARTHEST_MM: f64 = 1e12;
+
+/// A tree in picture space.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Scene {
+    /// By node, mm.
+    pub points_mm: Vec<DVec3>,
+    /// The radius to draw by node, mm; at least 0.
+    pub radii_mm: Vec<f64>,
+}
+
+impl Scene {
+    /// The embedded tree; z is 0 everywhere.
+    pub(crate) fn planar(tree: &Tree, embedding: &Embedding, width_scale: f64) -> Result<Self, Error> {
+        Self::new(
+            tree,
+            embedding.positions_mm.iter().map(|position| position.extend(0.0)).collect(),
+            width_scale,
+        )
+    }
+
+    /// The tree in space, as an orthographic view sees it.
+    pub(crate) fn seen(tree: &Tree, view: &View, width_scale: f64) -> Result<Self, Error> {
+        let View { towards_camera, up, center_mm, .. } = *view;
+        let right = up.cross(towards_camera);
+        let is_frame = (towards_camera.length() - 1.0).abs() < 1e-6
+            && (up.length() - 1.0).abs() < 1e-6
+            && (right.length() - 1.0).abs() < 1e-6;
+        if !is_frame || !center_mm.is_finite() {
+            return Err(Error::View { towards_camera, up });
+        }
+        let points = tree.nodes().iter().map(|node| {
+            let offset = node.position_mm - center_mm;
+            DVec3::new(offset.dot(right), offset.dot(up), offset.dot(towards_camera))
+        });
+        Self::new(tree, points.collect(), width_scale)
+    }
+
+    fn new(tree: &Tree, points_mm: Vec<DVec3>, width_scale: f64) -> Result<Self, Error> {
+        let radii_mm: Vec<f64> = tree.nodes().iter().map(|node| node.radius_mm * width_scale).collect();
+        for (node, (point, &radius_mm)) in points_mm.iter().zip(&radii_mm).enumerate() {
+            let far = point.abs().max_element();
+            if !point.is_finite() || far > FARTHEST_MM {
+                return Err(Error::Number { node, what: "picture coordinate", value: far });
+            }
+            if radius_mm > FARTHEST_MM {
+                return Err(Error::Number { node, what: "drawn radius", value: radius_mm });
+            }
+        }
+        Ok(Self { points_mm, radii_mm })
+    }
+
+    /// The corners of the box that holds every drawn disc, mm.
+    pub(crate) fn bounds_mm(&self) -> (DVec2, DVec2) {
+        self.points_mm.iter().zip(&self.radii_mm).fold(
+            (DVec2::INFINITY, DVec2::NEG_INFINITY),
+            |(low, high), (point, &radius)| {
+                (low.min(point.truncate() - radius), high.max(point.truncate() + radius))
+            },
+        )
+    }
+
+    /// The mean direction in which the tree leaves its root, a unit vector; up if it leaves to all sides alike.
+    pub(crate) fn root_direction(&self, tree: &Tree) -> DVec2 {
+        let root = self.points_mm[0].truncate();
+        let sum: DVec2 = tree
+            .children(0)
+            .iter()
+            .map(|&child| (self.points_mm[child].truncate() - root).normalize_or_zero())
+            .sum();
+        if math::hypot(sum.x, sum.y) > 1e-6 { sum.normalize() } else { DVec2::NEG_Y }
+    }
+}
