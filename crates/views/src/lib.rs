@@ -8,8 +8,9 @@
 //! | 4 | `objective` | part → what to minimise, and the answer for parts with many equally good views | ours |
 //! | 5 | `search`, `swarm` | objective → best direction | textbook; [Hu2022] Eq. 5 |
 //! | 6 | `hierarchy` | tree → global view, subtree views, planes | [Hu2022] 3.1.2, 3.2.1 |
-//! | 7 | `mirror` | planes → planes whose mirror is chosen | ours |
-//! | 8 | `recovery` | planes → how well they show the tree's angles | |
+//! | 7 | `headings` | planes → where each edge heads when the angles are strung together | [Hu2022] 3.2.1 |
+//! | 8 | `mirror` | planes → planes whose mirror is chosen | ours |
+//! | 9 | `recovery` | planes → how well they show the tree's angles | |
 //!
 //! **Spaces** positions are RAS+ mm; a view is orthographic, its picture has x to the right and y up.
 //!
@@ -18,6 +19,7 @@
 mod enhanced;
 mod error;
 mod frame;
+mod headings;
 mod hierarchy;
 mod metric;
 mod mirror;
@@ -89,7 +91,7 @@ pub fn find_views(tree: &Tree, params: &Params, seed: u64) -> Result<Found, Erro
     report.count_usize("forks_mirrored", forks().filter(|plane| plane.is_mirrored).count());
     report.count("global_loss", hierarchy.global.loss);
     report.count("global_camera_distance_mm", params.beta * hierarchy.global.radius_mm);
-    report.count("heading_mismatch", mirror::heading_mismatch(tree, &branches, &hierarchy));
+    report.count("heading_mismatch", headings::heading_mismatch(tree, &branches, &hierarchy));
     report.count("chain_angle_error_mean_deg", recovery.chain_error_mean_deg);
     report.count("fork_angle_error_mean_deg", recovery.fork_error_mean_deg);
     Ok(Found { hierarchy, report })
