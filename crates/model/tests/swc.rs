@@ -1,5 +1,5 @@
 //! SWC: the rules of the reader case by case, and every file of the real and the bad data.
-#![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+#![allow(clippy::expect_used, clippy::panic, clippy::print_stdout, reason = "this is how a test speaks")]
 #![allow(clippy::disallowed_methods, reason = "tests find their data through the environment")]
 
 use std::path::{Path, PathBuf};

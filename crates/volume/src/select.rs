@@ -22,7 +22,10 @@ pub(crate) fn select(volume: &Volume, params: &Params) -> Result<Selection, Erro
     let (lower, upper) = params.band();
     match params.method {
         Method::Auto => select_by_kind(volume, params.label),
-        Method::Mask => Ok(select_mask(volume)),
+        Method::Mask => match inspect_kind(volume) {
+            Kind::Mask { background, .. } => Ok(select_mask(volume, background)),
+            _ => Ok(select_mask(volume, 0.0)),
+        },
         Method::Threshold => Ok(Selection {
             voxels: volume.map_values(|value| (lower..=upper).contains(&value)),
             what: format!("the band {lower} to {upper}"),
@@ -41,11 +44,7 @@ fn select_label(volume: &Volume, label: f64) -> Selection {
     Selection { voxels: volume.map_values(|value| value == label), what: format!("label {label}") }
 }
 
-fn select_mask(volume: &Volume) -> Selection {
-    let background = match inspect_kind(volume) {
-        Kind::Mask { background, .. } => background,
-        _ => 0.0,
-    };
+fn select_mask(volume: &Volume, background: f64) -> Selection {
     let voxels = volume.map_values(|value| value != background && !value.is_nan());
     Selection { voxels, what: "the mask".to_owned() }
 }
@@ -55,7 +54,7 @@ fn select_by_kind(volume: &Volume, label: Option<f64>) -> Result<Selection, Erro
         return Ok(select_label(volume, label));
     }
     match inspect_kind(volume) {
-        Kind::Mask { .. } => Ok(select_mask(volume)),
+        Kind::Mask { background, .. } => Ok(select_mask(volume, background)),
         Kind::Constant { value } => {
             Err(Error::Empty { what: "a volume of one value".to_owned(), min: value, max: value })
         }

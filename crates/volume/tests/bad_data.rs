@@ -1,5 +1,5 @@
 //! Every file of the bad data: what it is read as, or which error it gives; and hostile bytes made here.
-#![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+#![allow(clippy::expect_used, clippy::panic, clippy::print_stdout, reason = "this is how a test speaks")]
 #![allow(clippy::disallowed_methods, reason = "tests find their data through the environment")]
 
 use std::path::{Path, PathBuf};

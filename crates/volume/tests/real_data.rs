@@ -1,5 +1,5 @@
 //! The volumes of the real data: what they are, and the airway that region growing must find.
-#![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+#![allow(clippy::expect_used, clippy::panic, clippy::print_stdout, reason = "this is how a test speaks")]
 #![allow(clippy::disallowed_methods, reason = "tests find their data through the environment")]
 
 use std::path::PathBuf;

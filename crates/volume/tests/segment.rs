@@ -42,10 +42,10 @@ fn methods() {
     let all = Params { components: Components::All, ..Params::default() };
     check("..77 7...", &all, "..## #...");
     check("4466", &all, "..##");
-    check("0123 0321", &Params { label: Some(2.0), ..all.clone() }, "..#. ..#.");
-    let band = Params { method: Method::Threshold, lower: Some(2.0), upper: Some(3.0), ..all.clone() };
+    check("0123 0321", &Params { label: Some(2.0), ..all }, "..#. ..#.");
+    let band = Params { method: Method::Threshold, lower: Some(2.0), upper: Some(3.0), ..all };
     check("01234567", &band, "..##....");
-    check("0120", &Params { method: Method::Mask, ..all.clone() }, ".##.");
+    check("0120", &Params { method: Method::Mask, ..all }, ".##.");
     // Over faces only, ends of the band included, and never out of the row into the next.
     let grow = Params { method: Method::RegionGrow, lower: Some(3.0), seed_voxel: Some([0, 0, 0]), ..all };
     check("35.9 .49. ...9", &grow, "##.. .##. ....");
