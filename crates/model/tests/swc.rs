@@ -4,6 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
+use espalier_geom::random::{Purpose, Stream};
 use espalier_model::Diagnose;
 use espalier_model::swc::{SwcError, SwcScale, Traced, parse};
 use glam::DVec3;
@@ -111,6 +112,34 @@ fn depth_is_the_files_not_ours() {
     text += &line(1, n_nodes.to_string());
     let error = parse(text.as_bytes(), &SwcScale::micrometres()).expect_err("a cycle");
     assert!(matches!(error, SwcError::Cycle { n_nodes: 300_000, .. }), "{error}");
+}
+
+/// 2000 mutants of a small file: none may panic, and what is accepted must keep the guarantees.
+#[test]
+fn mutants_never_panic() {
+    let original =
+        b"\xEF\xBB\xBF# head\r\n1 1 0 0 0 5 -1\n2,3,0,1.5,1e-3,1,1\n\t3 3 0 -2 2.5 .5 2 # x\n4 3 1 2 3 0 2";
+    let mut stream = Stream::new(23, Purpose::Test, 0, 0);
+    let mut n_read = 0;
+    for _ in 0..2000 {
+        let mut bytes = original.to_vec();
+        for _ in 0..1 + stream.below(3) {
+            let at = stream.below(bytes.len() as u32) as usize;
+            let pool = b"0123456789-+.,e#\n\r\t \0\xFFinfa";
+            bytes[at] = pool[stream.below(pool.len() as u32) as usize];
+        }
+        let Ok((Traced { nodes }, _)) = parse(&bytes, &SwcScale::nanometres()) else { continue };
+        n_read += 1;
+        for (node_idx, node) in nodes.iter().enumerate() {
+            assert!(node.position_mm.is_finite() && node.radius_mm >= 0.0 && node.radius_mm.is_finite());
+            // The way up ends within as many steps as there are nodes.
+            let above = |idx: &usize| nodes[*idx].parent;
+            assert!(
+                std::iter::successors(Some(node_idx), above).take(nodes.len() + 1).count() <= nodes.len()
+            );
+        }
+    }
+    assert!((200..1800).contains(&n_read), "{n_read} of 2000 read: too one-sided to test much");
 }
 
 fn data() -> Option<PathBuf> {

@@ -185,6 +185,6 @@ fn damage_is_told_from_truncation() {
     assert_eq!(outcome_of(&[member(&plain[..700]), member(&plain[700..])].concat()), Ok(()));
 
     // A legal stream that goes on far beyond the voxels.
-    let bomb = [plain.clone(), vec![0; 2 << 20]].concat();
+    let bomb = [plain, vec![0; 2 << 20]].concat();
     assert!(outcome_of(&member(&bomb)).is_err_and(|text| text.contains("more than 1048576 bytes follow")));
 }
