@@ -1,1 +1,84 @@
 //! Helpers of the end-to-end suite.
+
+use std::path::{Path, PathBuf};
+
+use espalier_model::{Embedding, Tree, swc};
+use espalier_pipeline::{Config, Error, Loaded, Override, Request, Stage, Summary};
+
+/// The folder of real data; `None`, and a line that says so, where `ESPALIER_DATA` is not set.
+///
+/// # Panics
+/// If the variable is set and does not lead to the data: a test must not pass by looking elsewhere.
+#[must_use]
+#[allow(clippy::disallowed_methods, clippy::print_stderr, clippy::panic, reason = "a helper of tests")]
+pub fn real_data() -> Option<PathBuf> {
+    let Some(folder) = std::env::var_os("ESPALIER_DATA").map(PathBuf::from) else {
+        eprintln!("skipped: ESPALIER_DATA not set");
+        return None;
+    };
+    assert!(folder.join("volumes").is_dir(), "ESPALIER_DATA is {}, which has no volumes", folder.display());
+    Some(folder)
+}
+
+/// A `--set` of the command line.
+#[must_use]
+pub fn set(key: &str, value: impl ToString) -> Override {
+    Override { key: key.to_owned(), value: value.to_string() }
+}
+
+/// A swarm small enough for tests in a debug build.
+#[must_use]
+pub fn small_swarm() -> Vec<Override> {
+    vec![set("embed.particles", 24), set("embed.iterations", 4), set("render.width_px", 400)]
+}
+
+/// A run of a config or an input into a folder.
+///
+/// # Errors
+/// As the run's.
+pub fn run(source: &Path, out: &Path, overrides: &[Override], threads: usize) -> Result<Summary, Error> {
+    espalier_pipeline::run(&request(source, out, overrides, threads)?, &|_| {})
+}
+
+/// As [`run`], from a stage on.
+///
+/// # Errors
+/// As the run's.
+pub fn run_from(source: &Path, out: &Path, overrides: &[Override], from: Stage) -> Result<Summary, Error> {
+    espalier_pipeline::run(&Request { from: Some(from), ..request(source, out, overrides, 2)? }, &|_| {})
+}
+
+fn request(source: &Path, out: &Path, overrides: &[Override], threads: usize) -> Result<Request, Error> {
+    let is_config = source.extension().is_some_and(|extension| extension == "toml");
+    let config = if is_config {
+        let text = std::fs::read_to_string(source)
+            .map_err(|cause| Error::Read { path: source.to_owned(), source: cause })?;
+        Config::parse(&text, source, overrides)?
+    } else {
+        Config::for_input(source, overrides)?
+    };
+    Ok(Request {
+        loaded: Loaded { config, base_dir: source.parent().unwrap_or(Path::new("")).to_owned() },
+        out: out.to_owned(),
+        from: None,
+        to: None,
+        files: std::collections::BTreeMap::new(),
+        threads: Some(threads),
+        max_memory_bytes: 4 << 30,
+        data_dir: None,
+    })
+}
+
+/// The tree and the embedding of a run folder.
+///
+/// # Panics
+/// If a file is missing or refused.
+#[must_use]
+#[allow(clippy::expect_used, reason = "a helper of tests")]
+pub fn results(out: &Path) -> (Tree, Embedding) {
+    let text = std::fs::read_to_string(out.join("tree.swc")).expect("tree.swc");
+    let tree = swc::read_tree(&text).expect("a tree");
+    let json = std::fs::read_to_string(out.join("embedding.json")).expect("embedding.json");
+    let embedding = Embedding::from_json(&json, &tree).expect("an embedding");
+    (tree, embedding)
+}

@@ -45,7 +45,7 @@ impl Artifacts {
             return Ok((Arc::clone(volume), Report::default()));
         }
         let path = self.locate(Artifact::Volume, lookup)?;
-        let loaded = self.read_volume(&path)?;
+        let loaded = self.read_volume(&path, lookup.stage)?;
         let volume = Arc::new(loaded.volume);
         self.volume = Some(Arc::clone(&volume));
         Ok((volume, loaded.report))
@@ -70,7 +70,7 @@ impl Artifacts {
             return Ok(Arc::clone(mask));
         }
         let path = self.locate(Artifact::Mask, lookup)?;
-        let volume = self.read_volume(&path)?.volume;
+        let volume = self.read_volume(&path, lookup.stage)?.volume;
         let mask = Arc::new(Mask::new(volume.grid().clone(), volume.map_values(|value| value != 0.0)));
         self.mask = Some(Arc::clone(&mask));
         Ok(mask)
@@ -81,7 +81,7 @@ impl Artifacts {
             return Ok(Arc::clone(skeleton));
         }
         let path = self.locate(Artifact::Skeleton, lookup)?;
-        let volume = self.read_volume(&path)?.volume;
+        let volume = self.read_volume(&path, lookup.stage)?.volume;
         let grid = volume.grid();
         let mut voxels = Vec::new();
         let mut index = 0;
@@ -106,7 +106,7 @@ impl Artifacts {
 
     pub(crate) fn tree(&mut self, lookup: Lookup<'_>) -> Result<Arc<Tree>, Error> {
         let tree = self.tree.clone();
-        let tree = self.parsed(tree, Artifact::Tree, lookup, |text| swc::read_tree(text.as_bytes()))?;
+        let tree = self.parsed(tree, Artifact::Tree, lookup, |text| swc::read_tree(text))?;
         self.tree = Some(Arc::clone(&tree));
         Ok(tree)
     }
@@ -144,8 +144,9 @@ impl Artifacts {
         parse(&text).map(Arc::new).map_err(|error| Error::file(&path, error))
     }
 
-    fn read_volume(&self, path: &Path) -> Result<espalier_volume::Loaded, Error> {
-        espalier_volume::read(path, &self.read_options).map_err(|error| Error::file(path, error))
+    fn read_volume(&self, path: &Path, stage: Stage) -> Result<espalier_volume::Loaded, Error> {
+        // The reader's own message names the file.
+        espalier_volume::read(path, &self.read_options).map_err(|error| Error::stage(stage)(Box::new(error)))
     }
 
     /// The file of an artifact: the one that the user named, else that of the run folder, checked.

@@ -17,20 +17,20 @@ pub enum Error {
     #[error(transparent)]
     Config(#[from] Box<ConfigError>),
     /// A stage refused its input or its parameters.
-    #[error("{stage}: {source}")]
+    #[error("{stage}: {cause}")]
     Stage {
         /// The stage.
         stage: Stage,
         /// What it said.
-        source: Box<dyn Diagnose + Send + Sync>,
+        cause: Box<dyn Diagnose + Send + Sync>,
     },
     /// A stage file cannot be used.
-    #[error("{path}: {source}", path = path.display())]
+    #[error("{path}: {cause}", path = path.display())]
     File {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
-        source: Box<dyn Diagnose + Send + Sync>,
+        cause: Box<dyn Diagnose + Send + Sync>,
     },
     /// A stage needs a file that is not there.
     #[error("{stage} needs the {what}, but there is no {path}", what = artifact.what(), path = path.display())]
@@ -108,11 +108,11 @@ pub enum Error {
 
 impl Error {
     pub(crate) fn stage(stage: Stage) -> impl Fn(Box<dyn Diagnose + Send + Sync>) -> Self {
-        move |source| Self::Stage { stage, source }
+        move |cause| Self::Stage { stage, cause }
     }
 
-    pub(crate) fn file(path: &Path, source: impl Diagnose + Send + Sync + 'static) -> Self {
-        Self::File { path: path.to_owned(), source: Box::new(source) }
+    pub(crate) fn file(path: &Path, cause: impl Diagnose + Send + Sync + 'static) -> Self {
+        Self::File { path: path.to_owned(), cause: Box::new(cause) }
     }
 }
 
@@ -120,7 +120,7 @@ impl Diagnose for Error {
     fn code(&self) -> &'static str {
         match self {
             Self::Config(error) => error.code(),
-            Self::Stage { source, .. } | Self::File { source, .. } => source.code(),
+            Self::Stage { cause, .. } | Self::File { cause, .. } => cause.code(),
             Self::MissingArtifact { .. } => "E-RUN-MISSING-FILE",
             Self::Altered { .. } => "E-RUN-ALTERED-FILE",
             Self::NoSuchStage { .. } | Self::EmptyRange { .. } => "E-RUN-STAGES",
@@ -135,7 +135,7 @@ impl Diagnose for Error {
     fn class(&self) -> Class {
         match self {
             Self::Config(error) => error.class(),
-            Self::Stage { source, .. } | Self::File { source, .. } => source.class(),
+            Self::Stage { cause, .. } | Self::File { cause, .. } => cause.class(),
             Self::NoSuchStage { .. } | Self::EmptyRange { .. } | Self::Threads { .. } => Class::Usage,
             Self::MissingArtifact { .. } | Self::Read { .. } | Self::Write { .. } => Class::Io,
             Self::Altered { .. } => Class::Uncertified,
@@ -147,7 +147,7 @@ impl Diagnose for Error {
     fn hint(&self) -> String {
         match self {
             Self::Config(error) => error.hint(),
-            Self::Stage { source, .. } | Self::File { source, .. } => source.hint(),
+            Self::Stage { cause, .. } | Self::File { cause, .. } => cause.hint(),
             Self::MissingArtifact { .. } => "start from an earlier stage with --from, or name the file".to_owned(),
             Self::Altered { .. } => {
                 "run the stage that makes it again; or, if the edit is meant, give the file to the stage's own \

@@ -7,7 +7,7 @@ use espalier_model::Diagnose;
 
 use crate::artifacts::Artifacts;
 use crate::clock::Stopwatch;
-use crate::config::{Config, Loaded, Source};
+use crate::config::{Config, Loaded, Source, Unit};
 use crate::error::Error;
 use crate::event::Event;
 use crate::folder::RunFolder;
@@ -143,7 +143,7 @@ fn resolve_source(request: &Request) -> Result<Source, Error> {
     let Loaded { config, base_dir } = &request.loaded;
     config.input.resolve(base_dir, request.data_dir.as_deref()).map_err(|error| Error::Stage {
         stage: Stage::Phantom,
-        source: Box::new(error),
+        cause: Box::new(error),
     })
 }
 
@@ -190,6 +190,7 @@ fn artifacts_of(request: &Request, source: &Source) -> Artifacts {
             max_bytes: request.max_memory_bytes,
             volume_index: input.volume_index,
             assume_space: input.assume_space,
+            unit_mm: (input.unit != Unit::Auto).then(|| input.unit.mm()),
             strict: input.strict,
         },
         traced_scale: matches!(source, Source::Tree(_)).then(|| input.traced_scale()),

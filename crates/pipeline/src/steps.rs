@@ -6,16 +6,16 @@ use std::sync::Arc;
 
 use espalier_model::table::{Table, fixed};
 use espalier_model::{
-    Embedding, Grid, InscribedSpheres, Ledger, Mask, MethodRow, Report, ViewHierarchy, nifti_out, swc,
+    Embedding, Grid, GridError, InscribedSpheres, Ledger, Mask, MethodRow, Report, ViewHierarchy, Volume,
+    nifti_out, swc,
 };
-use glam::DAffine3;
+use espalier_phantom::Phantom;
 
 use crate::artifacts::{Artifacts, Lookup};
 use crate::config::{Config, Source};
 use crate::error::Error;
 use crate::event::Event;
 use crate::folder::RunFolder;
-use crate::provenance;
 use crate::run::boxed;
 use crate::stage::{Artifact, Stage};
 
@@ -52,7 +52,7 @@ pub(crate) fn perform(step: &mut Step<'_>) -> Result<Outcome, Error> {
 
 fn phantom(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let Config { phantom: params, seed, .. } = step.config;
-    let failed = |error| step.failed(error);
+    let failed = |error| Error::stage(Stage::Phantom)(boxed(error));
     let mut report = Report::default();
     match *step.source {
         Source::PhantomTree(kind) => {
@@ -65,19 +65,12 @@ fn phantom(step: &mut Step<'_>) -> Result<Outcome, Error> {
         }
         Source::PhantomScan(kind) => {
             let made = espalier_phantom::generate(kind, params, *seed).map_err(failed)?;
-            let scan = espalier_phantom::ct(&made, params, *seed);
-            let grid = scan.grid();
+            let scan = espalier_phantom::ct(&made, params, *seed).map_err(failed)?;
             report.count_usize("nodes", made.tree.n_nodes());
-            report.count_usize("voxels", grid.n_voxels());
-            let line = format!("{}: {} tips, {}", kind.name(), made.tree.n_tips(), describe_grid(grid));
-            let truth = swc::write(&made.tree, &[("phantom", kind.name())]);
-            let nifti_failed = |error| Error::stage(Stage::Phantom)(boxed(error));
-            let files = vec![
-                step.place(Artifact::Volume, nifti_out::volume(&scan).map_err(nifti_failed)?),
-                step.beside("truth-mask.nii.gz", nifti_out::mask(&made.mask).map_err(nifti_failed)?),
-                step.place(Artifact::Traced, truth.into_bytes()),
-            ];
-            step.artifacts.volume = None;
+            report.count_usize("voxels", scan.grid().n_voxels());
+            let line = format!("{}: {} tips, {}", kind.name(), made.tree.n_tips(), describe_grid(scan.grid()));
+            let files = phantom_files(&made, &scan)?;
+            let files = files.into_iter().map(|(name, bytes)| step.beside(name, bytes)).collect();
             Ok(Outcome { files, report, line })
         }
         // A run from a file has no phantom stage.
@@ -87,11 +80,22 @@ fn phantom(step: &mut Step<'_>) -> Result<Outcome, Error> {
     }
 }
 
+/// The files of a phantom that has a scan, by name.
+pub(crate) fn phantom_files(made: &Phantom, scan: &Volume) -> Result<Vec<(&'static str, Vec<u8>)>, Error> {
+    let failed = |error| Error::stage(Stage::Phantom)(boxed(error));
+    let truth = swc::write(&made.tree, &[("phantom", made.kind.name())]);
+    let mut files = vec![("ct.nii.gz", nifti_out::volume(scan).map_err(failed)?), ("truth.swc", truth.into_bytes())];
+    if let Some(mask) = &made.mask {
+        files.push(("truth-mask.nii.gz", nifti_out::mask(mask).map_err(failed)?));
+    }
+    Ok(files)
+}
+
 fn volume(step: &mut Step<'_>) -> Result<Outcome, Error> {
-    let (scan, mut report) = step.artifacts.volume(step.lookup())?;
+    let (scan, mut report) = step.take(Artifacts::volume)?;
     let segmented =
         espalier_volume::segment(&scan, &step.config.volume).map_err(|error| step.failed(error))?;
-    let mask = on_file_grid(segmented.mask);
+    let mask = on_stored_grid(segmented.mask).map_err(|error| step.failed(error))?;
     let n_foreground = mask.n_foreground();
     let line = format!(
         "{n_foreground} voxels, {:.1} ml of {}",
@@ -110,7 +114,7 @@ fn volume(step: &mut Step<'_>) -> Result<Outcome, Error> {
 }
 
 fn skeleton(step: &mut Step<'_>) -> Result<Outcome, Error> {
-    let mask = step.artifacts.mask(step.lookup())?;
+    let mask = step.take(Artifacts::mask)?;
     let made =
         espalier_skeleton::skeletonize(&mask, &step.config.skeleton).map_err(|error| step.failed(error))?;
     let line = format!("{} voxels", made.skeleton.voxels().len());
@@ -120,8 +124,8 @@ fn skeleton(step: &mut Step<'_>) -> Result<Outcome, Error> {
 }
 
 fn radius(step: &mut Step<'_>) -> Result<Outcome, Error> {
-    let mask = step.artifacts.mask(step.lookup())?;
-    let skeleton = step.artifacts.skeleton(step.lookup())?;
+    let mask = step.take(Artifacts::mask)?;
+    let skeleton = step.take(Artifacts::skeleton)?;
     let measured = espalier_radius::inscribed_spheres(&mask, &skeleton, &step.config.radius)
         .map_err(|error| step.failed(error))?;
     let spheres = measured.spheres;
@@ -135,7 +139,7 @@ fn radius(step: &mut Step<'_>) -> Result<Outcome, Error> {
     for (voxel, sphere) in skeleton.voxels().iter().zip(&spheres.0) {
         field[mask.grid().index(voxel.map(|coordinate| coordinate as usize))] = sphere.radius_mm as f32;
     }
-    let radius_image = nifti_out::field(mask.grid(), &field).map_err(|error| step.failed(error))?;
+    let radius_image = nifti_out::scalars(mask.grid(), &field).map_err(|error| step.failed(error))?;
     let table = spheres.to_tsv();
     step.artifacts.spheres = Some(Arc::new(step.read_back(&table, InscribedSpheres::from_tsv)?));
     let files =
@@ -146,19 +150,19 @@ fn radius(step: &mut Step<'_>) -> Result<Outcome, Error> {
 fn tree(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let params = &step.config.tree;
     let (built, mut report) = if step.is_traced() {
-        let (traced, report) = step.artifacts.traced(step.lookup())?;
+        let (traced, report) = step.take(Artifacts::traced)?;
         (espalier_tree::from_traced(&traced, params).map_err(|error| step.failed(error))?, report)
     } else {
-        let mask = step.artifacts.mask(step.lookup())?;
-        let skeleton = step.artifacts.skeleton(step.lookup())?;
-        let spheres = step.artifacts.spheres(step.lookup())?;
+        let mask = step.take(Artifacts::mask)?;
+        let skeleton = step.take(Artifacts::skeleton)?;
+        let spheres = step.take(Artifacts::spheres)?;
         let built =
             espalier_tree::build(&mask, &skeleton, &spheres, params).map_err(|error| step.failed(error))?;
         (built, Report::default())
     };
     report.extend(built.report);
     let text = swc::write(&built.tree, &[("name", &step.config.name)]);
-    let tree = step.read_back(&text, |text| swc::read_tree(text.as_bytes()))?;
+    let tree = step.read_back(&text, swc::read_tree)?;
     let line = format!(
         "{} nodes, {} branches, {} tips, {}{}",
         tree.n_nodes(),
@@ -176,7 +180,7 @@ fn tree(step: &mut Step<'_>) -> Result<Outcome, Error> {
 }
 
 fn views(step: &mut Step<'_>) -> Result<Outcome, Error> {
-    let tree = step.artifacts.tree(step.lookup())?;
+    let tree = step.take(Artifacts::tree)?;
     let found = espalier_views::find_views(&tree, &step.config.views, step.config.seed)
         .map_err(|error| step.failed(error))?;
     let json = found.hierarchy.to_json();
@@ -193,8 +197,8 @@ fn views(step: &mut Step<'_>) -> Result<Outcome, Error> {
 }
 
 fn embed(step: &mut Step<'_>) -> Result<Outcome, Error> {
-    let tree = step.artifacts.tree(step.lookup())?;
-    let views = step.artifacts.views(step.lookup())?;
+    let tree = step.take(Artifacts::tree)?;
+    let views = step.take(Artifacts::views)?;
     let (events, stage) = (step.events, step.stage);
     let progress = move |p: espalier_embed::Progress| {
         let note = format!("energy {:.4}, crossings {}", p.energy, p.crossings);
@@ -217,9 +221,9 @@ fn embed(step: &mut Step<'_>) -> Result<Outcome, Error> {
 }
 
 fn render(step: &mut Step<'_>) -> Result<Outcome, Error> {
-    let tree = step.artifacts.tree(step.lookup())?;
-    let views = step.artifacts.views(step.lookup())?;
-    let embedding = step.artifacts.embedding(step.lookup())?;
+    let tree = step.take(Artifacts::tree)?;
+    let views = step.take(Artifacts::views)?;
+    let embedding = step.take(Artifacts::embedding)?;
     let mut params = step.config.render.clone();
     params.title.get_or_insert_with(|| step.config.name.clone());
     let made = espalier_render::render(&tree, &embedding, &views, &params).map_err(|error| step.failed(error))?;
@@ -235,9 +239,11 @@ fn render(step: &mut Step<'_>) -> Result<Outcome, Error> {
     Ok(Outcome { files, report: made.report, line })
 }
 
-impl Step<'_> {
-    fn lookup(&self) -> Lookup<'_> {
-        Lookup { folder: self.folder, stage: self.stage }
+impl<'a> Step<'a> {
+    /// An artifact, from memory or from its file.
+    fn take<T>(&mut self, artifact: impl FnOnce(&mut Artifacts, Lookup<'a>) -> Result<T, Error>) -> Result<T, Error> {
+        let lookup = Lookup { folder: self.folder, stage: self.stage };
+        artifact(self.artifacts, lookup)
     }
 
     fn failed(&self, error: impl espalier_model::Diagnose + Send + Sync + 'static) -> Error {
@@ -281,15 +287,10 @@ pub(crate) fn check_readable(path: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// The mask on the grid as a NIfTI-1 file states it, in single precision: what a later stage would read.
-fn on_file_grid(mask: Mask) -> Mask {
-    let affine = mask.grid().world_from_voxel();
-    let single = affine.to_cols_array().map(|value| f64::from(value as f32));
-    match Grid::new(mask.grid().shape(), DAffine3::from_cols_array(&single)) {
-        Ok(grid) => Mask::new(grid, mask.as_slice().to_vec()),
-        // Rounding to single precision cannot shear or flatten a legal grid beyond its tolerance by itself.
-        Err(_) => mask,
-    }
+/// The mask on its grid as a later stage would read it from the file.
+fn on_stored_grid(mask: Mask) -> Result<Mask, GridError> {
+    let grid = nifti_out::stored_grid(mask.grid())?;
+    Ok(if grid == *mask.grid() { mask } else { Mask::new(grid, mask.as_slice().to_vec()) })
 }
 
 fn describe_grid(grid: &Grid) -> String {

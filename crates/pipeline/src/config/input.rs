@@ -27,7 +27,7 @@ pub enum InputKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Unit {
-    /// µm for SWC.
+    /// By the header of a volume; µm for a traced tree.
     #[default]
     Auto,
     /// Millimetres.
@@ -68,10 +68,10 @@ pub struct Input {
     pub volume_index: Option<usize>,
     /// What to make of a volume whose header does not say where it lies.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub assume_space: Option<espalier_volume::AssumeSpace>,
+    pub assume_space: Option<espalier_volume::AssumedSpace>,
     /// Refuse what would otherwise be repaired with a warning. Default false.
     pub strict: bool,
-    /// The unit of a traced tree. Default `auto`: µm.
+    /// The unit of the input's coordinates. Default `auto`: by the header of a volume, µm for a traced tree.
     pub unit: Unit,
     /// How many units a step in x, y, z of a traced tree is. Default 1, 1, 1; for files in pixels and slices.
     pub scale: [f64; 3],

@@ -1,0 +1,188 @@
+//! The program as its user meets it: exit codes, messages, files left behind.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use tempfile::TempDir;
+
+fn espalier(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_espalier"))
+        .args(arguments)
+        .current_dir(folder)
+        .env_remove("ESPALIER_DATA")
+        .output()
+        .expect("the program starts")
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A folder with one file in it.
+fn folder_with(name: &str, bytes: &[u8]) -> TempDir {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    fs::write(folder.path().join(name), bytes).expect("write");
+    folder
+}
+
+/// Runs the program on a bad input and checks its code, its message, and that nothing but the input is there.
+#[track_caller]
+fn refused(folder: &TempDir, arguments: &[&str], exit_code: i32, fragments: &[&str]) {
+    let before = listing(folder.path());
+    let output = espalier(folder.path(), arguments);
+    let text = stderr(&output);
+    assert_eq!(output.status.code(), Some(exit_code), "{text}");
+    for fragment in fragments {
+        assert!(text.contains(fragment), "no {fragment:?} in: {text}");
+    }
+    assert!(!text.contains("panicked"), "{text}");
+    let left: Vec<String> = listing(folder.path()).into_iter().filter(|file| !before.contains(file)).collect();
+    assert!(
+        left.iter().all(|file| file.ends_with(".lock") || file.contains("provenance/") || file.ends_with("SHA256SUMS")),
+        "results left behind: {left:?}"
+    );
+}
+
+fn listing(folder: &Path) -> Vec<String> {
+    let mut files = Vec::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).expect("folder") {
+            let path = entry.expect("entry").path();
+            if path.is_dir() { folders.push(path) } else { files.push(path.display().to_string()) }
+        }
+    }
+    files.sort();
+    files
+}
+
+/// A gzipped NIfTI-1 file of 8³ voxels, all of this value.
+fn uniform_volume(value: bool) -> Vec<u8> {
+    let grid = espalier_model::Grid::axis_aligned([8, 8, 8], glam::DVec3::ONE, glam::DVec3::ZERO).expect("grid");
+    espalier_model::nifti_out::mask(&espalier_model::Mask::new(grid, vec![value; 512])).expect("bytes")
+}
+
+#[test]
+fn help_teaches_and_succeeds() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let output = espalier(folder.path(), &["--help"]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(0));
+    for command in ["run", "phantom", "volume", "skeleton", "radius", "tree", "views", "embed", "render"] {
+        assert!(text.contains(&format!("\n  {command} ")), "no {command} in: {text}");
+    }
+    assert!(text.contains("Exit codes:"));
+}
+
+#[test]
+fn missing_file() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    refused(&folder, &["run", "nowhere.nii.gz"], 74, &["nowhere.nii.gz", "hint"]);
+    assert!(listing(folder.path()).is_empty());
+    refused(&folder, &["run", "nowhere.toml"], 74, &["nowhere.toml"]);
+}
+
+#[test]
+fn directory_as_input() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    fs::create_dir(folder.path().join("scan.nii.gz")).expect("folder");
+    refused(&folder, &["run", "scan.nii.gz"], 74, &["scan.nii.gz", "directory"]);
+}
+
+#[test]
+fn truncated_gzip() {
+    let whole = uniform_volume(true);
+    let folder = folder_with("cut.nii.gz", &whole[..whole.len() / 2]);
+    refused(&folder, &["run", "cut.nii.gz"], 3, &["cut.nii.gz", "error[E-VOLUME"]);
+}
+
+#[test]
+fn empty_mask() {
+    let folder = folder_with("empty.nii.gz", &uniform_volume(false));
+    refused(&folder, &["run", "empty.nii.gz"], 3, &["error[E-VOLUME", "hint"]);
+}
+
+#[test]
+fn swc_with_a_cycle() {
+    let folder = folder_with("cycle.swc", b"1 1 0 0 0 1 -1\n2 2 1 0 0 1 4\n3 2 2 0 0 1 2\n4 2 3 0 0 1 3\n");
+    refused(&folder, &["run", "cycle.swc"], 3, &["cycle.swc", "cycle", "line"]);
+}
+
+#[test]
+fn misspelt_key() {
+    let config = "schema = 1\nname = \"x\"\n[input]\nphantom = \"neuron\"\n[embed]\nparticels = 64\n";
+    let folder = folder_with("typo.toml", config.as_bytes());
+    refused(&folder, &["run", "typo.toml"], 2, &["typo.toml:6", "particels", "did you mean particles?"]);
+    refused(
+        &folder,
+        &["run", "missing.swc", "--set", "embed.particels=4"],
+        2,
+        &["--set embed.particels=4", "did you mean particles?"],
+    );
+}
+
+#[test]
+fn value_out_of_range() {
+    let config = "schema = 1\nname = \"x\"\n[input]\nphantom = \"neuron\"\n[embed]\nw_angle = 2\nparticles = 0\n";
+    let folder = folder_with("range.toml", config.as_bytes());
+    refused(&folder, &["run", "range.toml"], 2, &["range.toml:7", "embed.particles", "is 0"]);
+}
+
+#[test]
+fn wrong_usage() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    refused(&folder, &["run"], 2, &["Usage"]);
+    refused(&folder, &["run", "x.swc", "--from", "emebd"], 2, &["emebd", "embed"]);
+    refused(&folder, &["skeleton", "a.nii.gz", "b.nii.gz", "-o", "x"], 2, &["mask"]);
+}
+
+#[test]
+fn output_folder_that_cannot_be() {
+    let folder = folder_with("ok.swc", b"1 1 0 0 0 1 -1\n2 2 1 0 0 1 1\n");
+    fs::write(folder.path().join("taken"), b"a file").expect("write");
+    refused(&folder, &["run", "ok.swc", "-o", "taken/run"], 73, &["taken"]);
+}
+
+#[test]
+fn a_folder_at_work_is_refused() {
+    let folder = folder_with("ok.swc", b"1 1 0 0 0 1 -1\n2 2 1 0 0 1 1\n");
+    let out = folder.path().join("held");
+    fs::create_dir(&out).expect("folder");
+    let lock = fs::File::create(out.join(".lock")).expect("lock file");
+    lock.lock().expect("lock");
+    refused(&folder, &["run", "ok.swc", "-o", "held"], 75, &["another run"]);
+    drop(lock);
+    assert_eq!(espalier(folder.path(), &["run", "ok.swc", "-o", "held"]).status.code(), Some(0));
+}
+
+/// A whole run, then the same in pieces: stage by stage on files, and again from the middle.
+#[test]
+fn stages_on_their_own_equal_a_run() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let run = |arguments: &[&str]| {
+        let output = espalier(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    run(&["phantom", "y", "-o", "y"]);
+    let swarm = ["--set", "embed.particles=16", "--set", "embed.iterations=4", "--set", "name=y"];
+    let with_swarm = |arguments: &[&str]| run(&[arguments, &swarm].concat());
+    let first = with_swarm(&["run", "y/truth-mask.nii.gz", "-o", "whole"]);
+    with_swarm(&["volume", "y/truth-mask.nii.gz", "-o", "pieces"]);
+    with_swarm(&["skeleton", "pieces/stages/01-volume/mask.nii.gz", "-o", "pieces"]);
+    let (mask, skeleton) = ("pieces/stages/01-volume/mask.nii.gz", "pieces/stages/02-skeleton/skeleton.nii.gz");
+    with_swarm(&["radius", mask, skeleton, "-o", "pieces"]);
+    with_swarm(&["tree", mask, skeleton, "pieces/stages/03-radius/spheres.tsv", "-o", "pieces"]);
+    with_swarm(&["views", "pieces/tree.swc", "-o", "pieces"]);
+    with_swarm(&["embed", "pieces/tree.swc", "pieces/views.json", "-o", "pieces"]);
+    with_swarm(&["render", "pieces/tree.swc", "pieces/views.json", "pieces/embedding.json", "-o", "pieces"]);
+    for file in ["tree.swc", "topology.tsv", "views.json", "embedding.json", "nodes.tsv", "planar.png", "planar.svg"] {
+        let [whole, pieces] = ["whole", "pieces"].map(|run| fs::read(folder.path().join(run).join(file)).expect("file"));
+        assert!(whole == pieces, "{file} differs");
+    }
+    let again = run(&["embed", "whole"]);
+    assert!(again.lines().last() == first.lines().last() || !folder.path().join("whole/planar.png").exists());
+    let digest = |text: &str| text.lines().last().map(str::to_owned);
+    assert_eq!(digest(&with_swarm(&["run", "y/truth-mask.nii.gz", "-o", "whole", "--from", "tree"])), digest(&first));
+}
