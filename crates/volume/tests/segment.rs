@@ -50,7 +50,7 @@ fn methods() {
     let grow = Params { method: Method::RegionGrow, lower: Some(3.0), seed_voxel: Some([0, 0, 0]), ..all };
     check("35.9 .49. ...9", &grow, "##.. .##. ....");
     check("5..5 ....", &grow, "#... ....");
-    let by_mm = Params { seed_voxel: None, seed_mm: Some([13.4, 10.9, 10.0]), ..grow.clone() };
+    let by_mm = Params { seed_voxel: None, seed_mm: Some([13.4, 10.9, 10.0]), ..grow };
     check("5..5 ....", &by_mm, "...# ....");
 
     assert_eq!(code("0123", &Params::default()), "E-VOLUME-METHOD 2");
@@ -61,10 +61,7 @@ fn methods() {
     assert_eq!(code("0012", &grow), "E-VOLUME-EMPTY 3");
     assert_eq!(code("0092", &grow), "E-VOLUME-SEED-BAND 2");
     for seed in [[-1, 0, 0], [4, 0, 0], [0, i64::MAX, 0], [0, 0, i64::MIN]] {
-        assert_eq!(
-            code("9092", &Params { seed_voxel: Some(seed), ..grow.clone() }),
-            "E-VOLUME-SEED-OUTSIDE 2"
-        );
+        assert_eq!(code("9092", &Params { seed_voxel: Some(seed), ..grow }), "E-VOLUME-SEED-OUTSIDE 2");
     }
 }
 
