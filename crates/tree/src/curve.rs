@@ -58,6 +58,8 @@ pub(crate) struct Fit {
     pub(crate) rms_mm: f64,
     /// Mean radius of the stretch, in mm.
     pub(crate) radius_mm: f64,
+    /// By how much the radius grows along the line, in mm per mm.
+    pub(crate) taper: f64,
 }
 
 /// Least squares of the positions against the sample's number: for evenly spaced samples of a stretch that does not
@@ -72,12 +74,16 @@ pub(crate) fn fit_line(stretch: &[Sample]) -> Option<Fit> {
     let slope: DVec3 =
         stretch.iter().enumerate().map(|(i, s)| (s.position_mm - point_mm) * (i as f64 - middle)).sum();
     let direction = slope.try_normalize()?;
+    let radius_mm = stretch.iter().map(|s| s.radius_mm).sum::<f64>() / n;
+    let radius_slope: f64 =
+        stretch.iter().enumerate().map(|(i, s)| (s.radius_mm - radius_mm) * (i as f64 - middle)).sum();
     let off_line = |s: &Sample| (s.position_mm - point_mm).reject_from_normalized(direction).length_squared();
     Some(Fit {
         point_mm,
         direction,
         rms_mm: (stretch.iter().map(off_line).sum::<f64>() / n).sqrt(),
-        radius_mm: stretch.iter().map(|s| s.radius_mm).sum::<f64>() / n,
+        radius_mm,
+        taper: radius_slope / slope.length(),
     })
 }
 

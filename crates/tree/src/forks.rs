@@ -6,7 +6,8 @@
 //!
 //! **Input** [`Outline`] with evenly spaced lines. **Output** the same; forks moved, their radii those of the tubes,
 //! lines led straight from the fork to where they are on their own axes.
-//! **Steps** 1. For each line at a fork fit a straight line to the stretch that begins outside of the fork's sphere.
+//! **Steps** 1. For each line at a fork fit a straight line to the stretch that begins outside of the fork's sphere and,
+//! if it is long enough for that, where its own spheres are clear of those of the fork's other lines.
 //! 2. The fork is the point nearest to all of them, each weighted by the inverse of its variance; the skeleton's own
 //! fork counts as one measurement with a standard deviation of its radius, so that axes that meet badly change little.
 //! 3. The move is bounded by `MAX_MOVE` radii, by half of each line's length, and by the mask.
@@ -27,6 +28,11 @@ use crate::outline::Outline;
 const STRETCH: f64 = 3.0;
 /// A shorter stretch than this, in radii of the branch, tells no direction.
 const MIN_STRETCH: f64 = 1.0;
+/// Two spheres are clear of each other if their centres are this share of the sum of their radii apart: where two equal
+/// tubes part at an angle β, both are on their axes from cos(β/2) on.
+const CLEAR: f64 = 0.95;
+/// Where tubes merge at most, in radii of the fork's sphere: beyond, branches are neighbours, not one body.
+const MERGED_REACH: f64 = 5.0;
 /// How far a fork may move, in radii of its own sphere.
 const MAX_MOVE: f64 = 2.0;
 /// What the position of a line is known to at best, in spacings of the grid: the scatter of sphere centres.
@@ -46,10 +52,7 @@ pub(crate) fn relocate(outline: &mut Outline, mask: &Mask) -> f64 {
     let incident = outline.incidence();
     let scatter_mm = SCATTER * mask.grid().spacing_mm().min_element();
     let forks: Vec<usize> = (0..outline.hubs.len()).filter(|&hub| incident[hub].len() > 2).collect();
-    let arms: Vec<Vec<Arm>> = forks
-        .iter()
-        .map(|&hub| incident[hub].iter().map(|&line| arm(outline, hub, line)).collect())
-        .collect();
+    let arms: Vec<Vec<Arm>> = forks.iter().map(|&hub| arms_of(outline, hub, &incident[hub])).collect();
     let moved: Vec<Sample> = forks
         .iter()
         .zip(&arms)
@@ -73,25 +76,63 @@ fn seen_from(samples: &[Sample], is_outgoing: bool) -> Vec<Sample> {
     if is_outgoing { samples.to_vec() } else { samples.iter().rev().copied().collect() }
 }
 
-fn arm(outline: &Outline, hub: usize, line_idx: usize) -> Arm {
-    let line = &outline.lines[line_idx];
-    let is_outgoing = line.from == hub;
-    let samples = seen_from(&line.samples, is_outgoing);
-    let arcs = arc_lengths_mm(&samples);
-    let length_mm = arcs[arcs.len() - 1];
+fn arms_of(outline: &Outline, hub: usize, lines: &[usize]) -> Vec<Arm> {
     let fork = outline.hubs[hub].sample;
-    let far_radius_mm = outline.hubs[if is_outgoing { line.to } else { line.from }].sample.radius_mm;
+    let is_outgoing: Vec<bool> = lines.iter().map(|&line| outline.lines[line].from == hub).collect();
+    let seen: Vec<Vec<Sample>> = lines
+        .iter()
+        .zip(&is_outgoing)
+        .map(|(&line, &is_outgoing)| seen_from(&outline.lines[line].samples, is_outgoing))
+        .collect();
+    (0..lines.len())
+        .map(|i| {
+            let line = &outline.lines[lines[i]];
+            let far_hub = if is_outgoing[i] { line.to } else { line.from };
+            let others = seen.iter().enumerate().filter(|&(j, _)| j != i).map(|(_, other)| near(other, fork));
+            let clear = first_clear(near(&seen[i], fork), &others.collect::<Vec<_>>());
+            let arcs = arc_lengths_mm(&seen[i]);
+            Arm {
+                line: lines[i],
+                is_outgoing: is_outgoing[i],
+                length_mm: arcs[arcs.len() - 1],
+                fit: fit_arm(&seen[i], &arcs, clear, (fork, outline.hubs[far_hub].sample.radius_mm)),
+            }
+        })
+        .collect()
+}
 
+/// The samples of a line before it is farther from its fork than merged tubes reach.
+fn near(samples: &[Sample], fork: Sample) -> &[Sample] {
+    let is_far = |s: &Sample| s.position_mm.distance(fork.position_mm) > MERGED_REACH * fork.radius_mm;
+    &samples[..samples.iter().position(is_far).unwrap_or(samples.len())]
+}
+
+/// The first sample from which on the spheres of a line are clear of those of the other lines.
+fn first_clear(samples: &[Sample], others: &[&[Sample]]) -> usize {
+    let touches =
+        |s: &Sample, t: &Sample| s.position_mm.distance(t.position_mm) < CLEAR * (s.radius_mm + t.radius_mm);
+    let is_clear = |s: &Sample| others.iter().all(|other| other.iter().all(|t| !touches(s, t)));
+    samples.iter().rposition(|s| !is_clear(s)).map_or(0, |last| last + 1)
+}
+
+/// The straight line of an arm, and the sample from which on it holds.
+fn fit_arm(
+    samples: &[Sample],
+    arcs: &[f64],
+    clear: usize,
+    (fork, far_radius_mm): (Sample, f64),
+) -> Option<(usize, Fit)> {
     let outside = |s: &Sample| s.position_mm.distance(fork.position_mm) >= fork.radius_mm;
-    let fit = samples.iter().position(outside).and_then(|first| {
+    let nearest = samples.iter().position(outside)?;
+    // The far end has a sphere of its own, inside of which the line is no better than here.
+    let end_mm = arcs[arcs.len() - 1] - far_radius_mm;
+    [nearest.max(clear), nearest].into_iter().filter(|&first| first < samples.len()).find_map(|first| {
         let radius_mm = samples[first].radius_mm;
-        // The far end has a sphere of its own, inside of which the line is no better than here.
-        let last_mm = (arcs[first] + STRETCH * radius_mm).min(length_mm - far_radius_mm);
+        let last_mm = (arcs[first] + STRETCH * radius_mm).min(end_mm);
         let last = arcs.iter().rposition(|&arc| arc <= last_mm)?;
         let is_long = last > first && arcs[last] - arcs[first] >= MIN_STRETCH * radius_mm;
         if is_long { fit_line(&samples[first..=last]).map(|fit| (first, fit)) } else { None }
-    });
-    Arm { line: line_idx, is_outgoing, length_mm, fit }
+    })
 }
 
 /// Where the arms meet, with the radius of the thickest of them.

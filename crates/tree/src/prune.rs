@@ -2,7 +2,8 @@
 //!
 //! **Input** a graph without cycles. **Output** the same without spurs; a ledger entry for each.
 //! **Steps** 1. A terminal branch is a spur if it is shorter than `prune_factor` × the radius at its fork, or than
-//! `prune_min_mm`. 2. Take the shortest spur away. 3. If two branches are left at its fork, they are one branch now,
+//! `prune_min_mm`; or if it winds, being less than twice that long, without getting that far from its fork. A stub
+//! of an opened loop must be `STUB_FACTOR` times as long to stay: most of them are holes in a wall. 2. Take the shortest spur away. 3. If two branches are left at its fork, they are one branch now,
 //! with their joint length. 4. Again, until there is no spur.
 //! **Guarantees** at least two branches stay at every fork that was one; protected tips stay; the result does not
 //! depend on the order of the voxels but for exact ties, which go to the lower hub index.
@@ -15,6 +16,11 @@ use espalier_model::{Ledger, LedgerEntry, LedgerKind};
 
 use crate::living::Living;
 use crate::params::Params;
+
+/// How much longer than other terminal branches a stub of an opened loop must be.
+const STUB_FACTOR: f64 = 2.0;
+/// A branch of at most this multiple of the limit may be a spur that winds.
+const WINDING: f64 = 2.0;
 
 /// Prunes all spurs whose tips are not protected; returns how many there were.
 pub(crate) fn prune(
@@ -41,8 +47,9 @@ pub(crate) fn prune(
             continue;
         }
         let fork_radius_mm = living.graph.hubs[fork].sample.radius_mm;
-        let limit_mm = (params.prune_factor * fork_radius_mm).max(params.prune_min_mm);
-        if run.length_mm >= limit_mm {
+        let stub_factor = if living.graph.hubs[tip].is_stub { STUB_FACTOR } else { 1.0 };
+        let limit_mm = stub_factor * (params.prune_factor * fork_radius_mm).max(params.prune_min_mm);
+        if !is_spur(living, tip, run.length_mm, limit_mm) {
             continue;
         }
 
@@ -68,4 +75,17 @@ pub(crate) fn prune(
         }
     }
     n_pruned
+}
+
+/// Whether the branch at a tip is shorter than the limit, or winds without leaving it.
+fn is_spur(living: &Living<'_>, tip: usize, length_mm: f64, limit_mm: f64) -> bool {
+    // Where two tubes part at a small angle, sphere centres jump between their axes: the branch is longer than it
+    // leads. Twice the limit bounds the walk.
+    if length_mm < limit_mm || length_mm >= WINDING * limit_mm {
+        return length_mm < limit_mm;
+    }
+    let Some(piece) = living.pieces_at(tip).next() else { return false };
+    let (branch, fork, _) = living.branch_from(tip, piece);
+    let fork_mm = living.graph.hubs[fork].sample.position_mm;
+    branch.iter().all(|s| s.position_mm.distance(fork_mm) < limit_mm)
 }

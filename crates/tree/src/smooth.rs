@@ -18,7 +18,7 @@ use crate::outline::Outline;
 /// Samples to the smallest spacing.
 const SAMPLES_PER_SPACING: f64 = 2.0;
 /// The Gaussian ends after so many standard deviations.
-const TRUNCATE: f64 = 3.0;
+const TRUNCATE: f64 = 4.0;
 
 /// Spaces the samples of every line evenly, two to the smallest spacing.
 pub(crate) fn space_evenly(outline: &mut Outline, grid: &Grid) {
@@ -85,7 +85,7 @@ fn gaussian_at(samples: &[Sample], i: usize, sigma: f64) -> Sample {
     let (mut weights, mut position_mm, mut radius_mm) = (0.0, DVec3::ZERO, 0.0);
     for offset in -n_taps..=n_taps {
         let u = offset as f64 / sigma.max(1e-9);
-        let weight = math::exp(-0.5 * u * u);
+        let weight = (1.5 - 0.5 * u * u) * math::exp(-0.5 * u * u);
         let sample = at(offset);
         weights += weight;
         position_mm += sample.position_mm * weight;

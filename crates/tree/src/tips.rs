@@ -14,7 +14,12 @@
 //! **Left alone** stubs of opened loops: they are no ends of the organ.
 //! **Cost** O(N + steps along the tangents).
 
+use std::f64::consts::TAU;
+
+use espalier_geom::math::unit_vector;
+use espalier_geom::space::plane_axes;
 use espalier_model::{Ledger, LedgerEntry, LedgerKind, Mask};
+use glam::DVec3;
 
 use crate::curve::{arc_lengths_mm, fit_line};
 use crate::graph::Sample;
@@ -30,6 +35,13 @@ const NEARLY: f64 = 0.9;
 const STRETCH: f64 = 2.0;
 /// At most this share of a line is dropped as following the surface, or by setting its end back.
 const MAX_DROPPED: f64 = 0.5;
+/// Rays beside the axis: their distances from it, in radii of the end sphere, and how many at each.
+const RINGS: [f64; 2] = [0.3, 0.6];
+const SPOKES: usize = 8;
+/// The rays beside the axis correct the one on it by at most this many radii.
+const MAX_CORRECTION: f64 = 0.5;
+/// So far inside the end sphere, in calibres, spheres may still be cut short by the end.
+const END_ZONE: f64 = 0.25;
 /// How far the mask is followed beyond the end sphere's centre, in its radii.
 const LOOK_AHEAD: f64 = 2.0;
 
@@ -90,14 +102,14 @@ fn moved(inwards: &[Sample], mask: &Mask, tips: Tips) -> Option<Moved> {
         .fold(tip.radius_mm, f64::max);
     let end = inwards.iter().position(|s| s.radius_mm >= NEARLY * calibre_mm)?;
     let end = if arcs[end] <= droppable_mm { end } else { 0 };
-    let radius_mm = inwards[end].radius_mm;
 
     let inner = arcs.iter().rposition(|&arc| arc <= arcs[end] + STRETCH * calibre_mm)?;
     let fit = fit_line(&inwards[end..=inner])?;
     let outwards = -fit.direction;
     let on_axis = fit.point_mm + (inwards[end].position_mm - fit.point_mm).project_onto_normalized(outwards);
+    let radius_mm = radius_at(&inwards[end..=inner], &arcs[end..=inner], on_axis, calibre_mm);
 
-    let free_mm = free_length_mm(mask, on_axis, outwards, LOOK_AHEAD * radius_mm)?;
+    let free_mm = free_end_mm(mask, on_axis, outwards, radius_mm)?;
     let ends_at_border = leaves_scan(mask, on_axis, outwards, free_mm);
     let beyond_mm = match tips {
         _ if ends_at_border => free_mm,
@@ -114,4 +126,42 @@ fn moved(inwards: &[Sample], mask: &Mask, tips: Tips) -> Option<Moved> {
     samples.extend_from_slice(&inwards[first_kept.min(inwards.len() - 1)..]);
     let outwards_mm = (new_tip.position_mm - tip.position_mm).dot(outwards);
     Some(Moved { samples, outwards_mm })
+}
+
+/// How far the mask goes on from a point along its axis, in mm; `None` if the point lies outside of it.
+///
+/// One ray alone is wrong by up to a voxel. So there are rays beside it, and their ends are fitted by h = h₀ − c ρ² over
+/// the distance ρ from the axis, which holds for flat ends and for round ones.
+fn free_end_mm(mask: &Mask, on_axis: DVec3, outwards: DVec3, radius_mm: f64) -> Option<f64> {
+    let limit_mm = LOOK_AHEAD * radius_mm;
+    let on_axis_mm = free_length_mm(mask, on_axis, outwards, limit_mm)?;
+    let (right, up) = plane_axes(outwards, DVec3::Z);
+    let mut ends = vec![(0.0, on_axis_mm)];
+    for share in RINGS {
+        for spoke in 0..SPOKES {
+            let around = unit_vector(TAU * (spoke as f64 + share) / SPOKES as f64);
+            let aside = (right * around.x + up * around.y) * share * radius_mm;
+            if let Some(end_mm) = free_length_mm(mask, on_axis + aside, outwards, limit_mm) {
+                ends.push((share * share, end_mm));
+            }
+        }
+    }
+    let n = ends.len() as f64;
+    let (mean_x, mean_y) =
+        (ends.iter().map(|e| e.0).sum::<f64>() / n, ends.iter().map(|e| e.1).sum::<f64>() / n);
+    let variance: f64 = ends.iter().map(|e| (e.0 - mean_x) * (e.0 - mean_x)).sum();
+    let covariance: f64 = ends.iter().map(|e| (e.0 - mean_x) * (e.1 - mean_y)).sum();
+    let is_whole = ends.len() == 1 + RINGS.len() * SPOKES;
+    let fitted_mm = mean_y - mean_x * covariance / variance.max(f64::MIN_POSITIVE);
+    // Where the tip is narrower than its end sphere, or bent, the axis alone has to do.
+    let is_near = (fitted_mm - on_axis_mm).abs() <= MAX_CORRECTION * radius_mm;
+    Some(if is_whole && is_near { fitted_mm } else { on_axis_mm })
+}
+
+/// The radius of the tube at its end, in mm, from the stretch inside of it: the spheres at the very end are smaller.
+fn radius_at(stretch: &[Sample], arcs: &[f64], end: DVec3, calibre_mm: f64) -> f64 {
+    let first = arcs.iter().position(|&arc| arc >= arcs[0] + END_ZONE * calibre_mm).unwrap_or(0);
+    let Some(fit) = fit_line(&stretch[first..]) else { return stretch[0].radius_mm };
+    let extrapolated = fit.radius_mm + fit.taper * (end - fit.point_mm).dot(fit.direction);
+    extrapolated.clamp(NEARLY * calibre_mm, calibre_mm)
 }
