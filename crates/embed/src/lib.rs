@@ -19,6 +19,11 @@
 
 mod batch;
 mod certify;
+#[cfg(test)]
+mod checks;
+#[cfg(test)]
+#[path = "../tests/common/mod.rs"]
+mod common;
 mod crossing;
 mod distances;
 mod energy;

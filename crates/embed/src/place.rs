@@ -9,6 +9,7 @@ use espalier_geom::math;
 use glam::DVec2;
 
 use crate::problem::Problem;
+use crate::ratio;
 
 /// Positions from headings, with the exact lengths.
 pub(crate) fn from_headings(problem: &Problem, heading_rad: &[f64]) -> Vec<DVec2> {
@@ -39,4 +40,15 @@ pub(crate) fn turns(problem: &Problem, heading_rad: &[f64]) -> Vec<f64> {
         parent => angle::wrap(heading_rad[node] - heading_rad[parent]),
     };
     (0..heading_rad.len()).map(turn).collect()
+}
+
+/// The angle ratio of each edge, 0 for the root. Children of the root have one too, against heading 0: it costs
+/// nothing, but a particle must have it to be the same layout.
+pub(crate) fn angle_ratios(problem: &Problem, heading_rad: &[f64]) -> Vec<f64> {
+    let mut ratios = vec![0.0; heading_rad.len()];
+    for node in 1..heading_rad.len() {
+        let turn_rad = heading_rad[node] - heading_rad[problem.parent[node] as usize];
+        ratios[node] = ratio::angle_ratio(problem.targets.angle_rad[node], turn_rad);
+    }
+    ratios
 }

@@ -36,17 +36,13 @@ pub(crate) fn run_methods(
         layouts.push((Method::Projection, Layout::constructed("projection", positions)));
     }
     // Radial and cone cost next to nothing, and one of them is the way out when the method asked for crosses.
-    let radial = place::from_headings(problem, &radial::headings(problem));
-    let cone = place::from_headings(problem, &cone::headings(problem));
+    let (radial, cone) = (radial::headings(problem), cone::headings(problem));
     let swarm = if wants(Method::Pso) {
-        let radial = energy::score(problem, &radial, 0.0, 0);
-        let cone = energy::score(problem, &cone, 0.0, 0);
-        let radial = (radial.length_ratio.as_slice(), radial.angle_ratio.as_slice());
-        let cone = (cone.length_ratio.as_slice(), cone.angle_ratio.as_slice());
-        Some(pso::layout(problem, radial, cone, (params, seed), progress)?)
+        Some(pso::layout(problem, (&radial, &cone), (params, seed), progress)?)
     } else {
         None
     };
+    let (radial, cone) = (place::from_headings(problem, &radial), place::from_headings(problem, &cone));
     layouts.push((Method::Radial, Layout::constructed("radial", radial)));
     layouts.push((Method::Cone, Layout::constructed("cone", cone)));
     layouts.extend(swarm.map(|layout| (Method::Pso, layout)));

@@ -74,7 +74,7 @@ mod tests {
         let apart = separated(&[2.0, 1.0, 2.0]);
         assert!((apart[0] - 1.975).abs() < 1e-12 && (apart[2] - 2.025).abs() < 1e-12 && apart[1] == 1.0);
         assert!((separated(&[0.0, 5.0])[0] - MARGIN_RAD).abs() < 1e-12);
-        assert!((separated(&[TAU, 6.28])[0] - (TAU - MARGIN_RAD)).abs() < 1e-12);
+        assert!((separated(&[TAU, 6.27])[0] - (TAU - MARGIN_RAD)).abs() < 1e-12);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //!
 //! **Input** the problem. **Output** the heading of each edge, radians; exact lengths.
 //! **Notation** I_v the interval of directions of node v, at most 0.9π wide; h_v ∈ I_v its heading.
-//! **Steps** 1. Root: one interval per child, in target order, wide by tips, at most 0.9π. 2. In preorder: a
+//! **Steps** 1. Root: half a circle for the children on each side, shared by tips, at most 0.9π each. 2. In preorder: a
 //! single child goes straight on and keeps the interval. At a fork the children that turn right share the part of
 //! I_v right of h_v, the others the left part, in target order, wide by tips. 3. h_v sits in I_v at the share of
 //! tips that the next fork below sends right, so that every tip gets a like share.
@@ -13,7 +13,7 @@
 //! 10,000 teeth would underflow, so they shrink only by the fourth root of the number of tips.
 //! **Cost** O(N log k) for forks of k children.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use crate::problem::Problem;
 
@@ -29,12 +29,7 @@ pub(crate) fn headings(problem: &Problem) -> Vec<f64> {
     let right_share = right_shares(problem, &n_tips);
     let mut heading_rad = vec![0.0; n_nodes];
     let mut interval = vec![(0.0, 0.0); n_nodes];
-    share_out(problem.children_by_target(0), (-PI, PI), &n_tips, &mut interval);
-    for &child in problem.tree.children(0) {
-        let (low, high) = interval[child];
-        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low).min(WIDEST_RAD));
-        interval[child] = (middle - half, middle + half);
-    }
+    root_intervals(problem, &n_tips, &right_share, &mut interval);
 
     for node in 1..n_nodes {
         let (low, high) = interval[node];
@@ -46,15 +41,36 @@ pub(crate) fn headings(problem: &Problem) -> Vec<f64> {
             [] => {}
             &[child] => interval[child] = interval[node],
             _ => {
-                let children = problem.children_by_target(node);
-                let n_right = children.iter().filter(|&&child| problem.side[child] < 0.0).count();
-                let (right, left) = children.split_at(n_right);
-                share_out(right.to_vec(), (low, heading_rad[node]), &n_tips, &mut interval);
-                share_out(left.to_vec(), (heading_rad[node], high), &n_tips, &mut interval);
+                let (right, left) = by_side(problem, node);
+                share_out(&right, (low, heading_rad[node]), &n_tips, &mut interval);
+                share_out(&left, (heading_rad[node], high), &n_tips, &mut interval);
             }
         }
     }
     heading_rad
+}
+
+/// The intervals of the root's children: those that turn right share the right half of the circle, the others
+/// the left, so that this layout is a particle too; a single child points to heading 0.
+fn root_intervals(problem: &Problem, n_tips: &[u32], right_share: &[f64], interval: &mut [(f64, f64)]) {
+    if let &[child] = problem.tree.children(0) {
+        let low = -right_share[child] * WIDEST_RAD;
+        interval[child] = (low, low + WIDEST_RAD);
+        return;
+    }
+    let (right, left) = by_side(problem, 0);
+    share_out(&right, (-PI, 0.0), n_tips, interval);
+    share_out(&left, (0.0, PI), n_tips, interval);
+    for &child in problem.tree.children(0) {
+        let (low, high) = interval[child];
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low).min(WIDEST_RAD));
+        interval[child] = (middle - half, middle + half);
+    }
+}
+
+/// The children that turn right and those that turn left, each in target order.
+fn by_side(problem: &Problem, node: usize) -> (Vec<usize>, Vec<usize>) {
+    problem.children_by_target(node).into_iter().partition(|&child| problem.side[child] < 0.0)
 }
 
 /// Where in its interval a node's heading sits: the share of tips that the next fork below it sends right.
@@ -77,13 +93,12 @@ fn right_shares(problem: &Problem, n_tips: &[u32]) -> Vec<f64> {
 }
 
 /// Cuts an interval into one for each child, wide by tips.
-fn share_out(children: Vec<usize>, (low, high): (f64, f64), n_tips: &[u32], interval: &mut [(f64, f64)]) {
+fn share_out(children: &[usize], (low, high): (f64, f64), n_tips: &[u32], interval: &mut [(f64, f64)]) {
     let all: f64 = children.iter().map(|&child| f64::from(n_tips[child])).sum();
     let mut before = 0.0;
-    for child in children {
+    for &child in children {
         let start = low + (high - low) * (before / all);
         before += f64::from(n_tips[child]);
         interval[child] = (start, low + (high - low) * (before / all));
     }
-    debug_assert!(TAU >= high - low, "an interval of directions is at most a circle");
 }

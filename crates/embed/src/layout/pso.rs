@@ -27,16 +27,13 @@ use crate::error::Error;
 use crate::layout::Layout;
 use crate::layout::start::{self, Incumbents, segments_below};
 use crate::params::{Freedom, Params, Pull};
+use crate::place;
 use crate::problem::Problem;
 
-/// Ratios per node, (r_l, r_a), of a layout that a particle may start from.
-pub(crate) type NodeRatios<'a> = (&'a [f64], &'a [f64]);
-
-/// Runs the swarm.
+/// Runs the swarm; the radial layout and the cone, as headings, are among its particles.
 pub(crate) fn layout(
     problem: &Problem,
-    radial: NodeRatios,
-    cone: NodeRatios,
+    (radial, cone): (&[f64], &[f64]),
     (params, seed): (&Params, u64),
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Layout, Error> {
@@ -47,19 +44,22 @@ pub(crate) fn layout(
     }
     check_memory(params, dofs.dims())?;
     let energy = CpuEnergy { problem, dofs: &dofs };
-    let incumbents = Incumbents {
-        radial: dofs.particle(problem, radial.0, radial.1),
-        cone: dofs.particle(problem, cone.0, cone.1),
+    let exact_lengths = vec![0.0; problem.n_nodes()];
+    let as_particle = |heading_rad: &[f64]| {
+        dofs.particle(problem, &exact_lengths, &place::angle_ratios(problem, heading_rad))
     };
+    let incumbents = Incumbents { radial: as_particle(radial), cone: as_particle(cone) };
+
     // P_g ← P_0: where it has no crossing the loop has nothing to do.
     let targets = vec![0.0; dofs.dims()];
     if let Some(score) = energy.evaluate_one(&targets, f64::INFINITY, &mut Scratch::default())
         && score.crossings == 0
     {
-        let mut swarm = Swarm::new(start::Swarm::of(targets), dofs.dims());
-        swarm.evaluate(&energy);
-        swarm.record(0, params, progress);
-        return Ok(swarm.into_layout(name, &energy));
+        let Score { energy: least, crossings } = score;
+        let point = TracePoint { iteration: 0, evaluations: 1, energy: least, crossings };
+        report(&point, params, progress);
+        let positions = energy.positions(&targets);
+        return Ok(Layout { name, positions, evaluations: 1, trace: vec![point] });
     }
     let mut swarm = Swarm::new(start::start(&energy, &incumbents, params, seed), dofs.dims());
 
@@ -74,7 +74,12 @@ pub(crate) fn layout(
         swarm.evaluate(&energy);
         swarm.record(iteration, params, progress);
     }
-    Ok(swarm.into_layout(name, &energy))
+    Ok(Layout {
+        name,
+        positions: energy.positions(&swarm.global_best),
+        evaluations: swarm.evaluations,
+        trace: swarm.trace,
+    })
 }
 
 fn name(params: &Params) -> String {
@@ -125,7 +130,8 @@ impl Swarm {
             scores: vec![None; n_particles],
             global_best: vec![0.0; dims],
             global_score: Score { energy: f64::INFINITY, crossings: 0 },
-            evaluations: start.evaluations,
+            // One more for the look at the targets themselves.
+            evaluations: start.evaluations + 1,
             trace: Vec::new(),
         }
     }
@@ -168,22 +174,22 @@ impl Swarm {
         });
     }
 
-    fn into_layout(self, name: String, energy: &CpuEnergy) -> Layout {
-        let positions = energy.positions(&self.global_best);
-        Layout { name, positions, evaluations: self.evaluations, trace: self.trace }
-    }
-
     fn record(&mut self, iteration: u32, params: &Params, progress: &(dyn Fn(Progress) + Sync)) {
         let Score { energy, crossings } = self.global_score;
-        self.trace.push(TracePoint { iteration, evaluations: self.evaluations, energy, crossings });
-        progress(Progress {
-            done: u64::from(iteration),
-            total: u64::from(params.iterations),
-            evaluations: self.evaluations,
-            energy,
-            crossings,
-        });
+        let point = TracePoint { iteration, evaluations: self.evaluations, energy, crossings };
+        report(&point, params, progress);
+        self.trace.push(point);
     }
+}
+
+fn report(point: &TracePoint, params: &Params, progress: &(dyn Fn(Progress) + Sync)) {
+    progress(Progress {
+        done: u64::from(point.iteration),
+        total: u64::from(params.iterations),
+        evaluations: point.evaluations,
+        energy: point.energy,
+        crossings: point.crossings,
+    });
 }
 
 /// Eq. 5 as printed.

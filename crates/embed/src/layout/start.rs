@@ -41,13 +41,6 @@ pub(crate) struct Swarm {
     pub(crate) evaluations: u64,
 }
 
-impl Swarm {
-    /// One particle at rest.
-    pub(crate) fn of(ratios: Vec<f64>) -> Self {
-        Self { velocities: vec![0.0; ratios.len()], ratios, evaluations: 0 }
-    }
-}
-
 /// The swarm's start.
 pub(crate) fn start(energy: &CpuEnergy, incumbents: &Incumbents, params: &Params, seed: u64) -> Swarm {
     match params.start {

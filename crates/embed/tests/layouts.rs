@@ -1,0 +1,273 @@
+//! The whole stage on random trees: what it promises, for every tree.
+
+mod common;
+
+use common::{random_tree, tree_of, views_along};
+use espalier_embed::{
+    CrossingWeight, Embedded, Error, Freedom, Method, Params, Pull, Start, TargetMode, embed,
+};
+use espalier_model::diagnose::{Class, Diagnose};
+use espalier_model::{Embedding, MethodRow, Termination, Tree};
+use glam::{DVec2, DVec3};
+
+fn small() -> Params {
+    Params { particles: 24, iterations: 8, ..Params::default() }
+}
+
+fn laid_flat(tree: &Tree, params: &Params) -> Embedded {
+    embed(tree, &views_along(tree, DVec3::Z), params, 7, &|_| {}).expect("a certified layout")
+}
+
+#[test]
+fn the_result_is_certified_and_never_worse() {
+    let mut n_improved = 0;
+    for key in 0..96 {
+        let tree = random_tree(key as usize % 8, 10 + key as usize, 2.0, false, key);
+        let (freedom, pull, start) = match key % 4 {
+            0 => (Freedom::S, Pull::Uniform, Start::Paper),
+            1 => (Freedom::B, Pull::Subtree, Start::Relaxed),
+            2 => (Freedom::N, Pull::Uniform, Start::Relaxed),
+            _ => (Freedom::N, Pull::Subtree, Start::Relaxed),
+        };
+        let params = Params { freedom, pull, start, ..small() };
+        let embedding = laid_flat(&tree, &params).embedding;
+        assert!(embedding.certificate.holds());
+        let energy = embedding.energy.total();
+        for row in &embedding.methods {
+            assert_eq!(row.targets, embedding.targets.kind);
+            let is_constructed = row.method == "radial" || row.method == "cone";
+            assert!(!is_constructed || row.crossings == 0, "{} of tree {key}", row.method);
+            assert!(row.crossings > 0 || energy <= row.energy.total(), "{} of tree {key}", row.method);
+        }
+        let constructed = embedding.methods[1].energy.total().min(embedding.methods[2].energy.total());
+        n_improved += usize::from(energy < constructed);
+        let energies: Vec<f64> = embedding.trace.iter().map(|point| point.energy).collect();
+        assert!(energies.windows(2).all(|pair| pair[1] <= pair[0]), "{energies:?}");
+    }
+    assert!(n_improved > 70, "{n_improved}");
+}
+
+#[test]
+fn planar_trees_come_out_exactly() {
+    let mut n_planar = 0;
+    for key in 0..200 {
+        let tree = random_tree(key as usize % 8, 4 + key as usize % 12, 1.0, true, key);
+        let embedding = laid_flat(&tree, &small()).embedding;
+        let projection = &embedding.methods[0];
+        if projection.crossings > 0 || !has_wide_angles(&tree) {
+            continue;
+        }
+        n_planar += 1;
+        // The plane is its own best layout: every distance is kept.
+        assert!(projection.energy.total() < 1e-20, "tree {key}: {:?}", projection.energy);
+        assert_eq!(embedding.termination, Termination::Optimal, "tree {key}");
+        assert_eq!(embedding.energy.length + embedding.energy.angle + embedding.energy.crossing, 0.0);
+        assert!(embedding.losses.stress < 1e-9 && embedding.losses.angle3d_error_max_deg < 1e-6);
+        // In the pose of the view, so it lies where the view shows it.
+        for (node, flat) in embedding.positions_mm.iter().enumerate() {
+            let seen = tree.position_mm(node) - tree.position_mm(0);
+            assert!(flat.distance(DVec2::new(seen.x, seen.y)) < 1e-9, "tree {key}, node {node}");
+        }
+    }
+    assert!(n_planar > 50, "{n_planar}");
+}
+
+/// Whether no target has to move for siblings that are too near, or edges that fold back.
+fn has_wide_angles(tree: &Tree) -> bool {
+    let heading = |node: usize, hub: usize| {
+        let edge = tree.position_mm(node) - tree.position_mm(hub);
+        espalier_geom::angle::heading(DVec2::new(edge.x, edge.y))
+    };
+    (0..tree.n_nodes()).all(|hub| {
+        let mut around: Vec<f64> = tree.children(hub).iter().map(|&child| heading(child, hub)).collect();
+        around.extend(tree.parent(hub).map(|parent| heading(parent, hub)));
+        around.sort_by(f64::total_cmp);
+        let gaps = around.windows(2).map(|pair| pair[1] - pair[0]);
+        gaps.chain(around.first().map(|first| first + std::f64::consts::TAU - around[around.len() - 1]))
+            .all(|gap| gap > 0.06)
+    })
+}
+
+#[test]
+fn same_bytes_for_any_number_of_threads() {
+    let tree = random_tree(0, 120, 1.0, false, 5);
+    let with_threads = |n_threads: usize, params: &Params| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().expect("a pool");
+        pool.install(|| laid_flat(&tree, params).embedding.to_json())
+    };
+    for params in [small(), Params { particles: 60, iterations: 5, ..Params::paper() }] {
+        let one = with_threads(1, &params);
+        assert_eq!(one, with_threads(2, &params));
+        assert_eq!(one, with_threads(3, &params));
+    }
+}
+
+#[test]
+fn the_seed_matters_and_is_kept() {
+    let tree = random_tree(0, 120, 1.0, false, 5);
+    let views = views_along(&tree, DVec3::Z);
+    let with_seed = |seed: u64| embed(&tree, &views, &small(), seed, &|_| {}).expect("a layout").embedding;
+    let (one, other) = (with_seed(1), with_seed(2));
+    assert_eq!((one.seed, other.seed), (1, 2));
+    assert_ne!(one.positions_mm, other.positions_mm);
+}
+
+#[test]
+fn the_smallest_trees() {
+    let single = laid_flat(&tree_of(&[(5.0, 5.0, 5.0, None)]), &small()).embedding;
+    assert_eq!(single.positions_mm, [DVec2::ZERO]);
+    assert_eq!(single.termination, Termination::Optimal);
+
+    let pair = laid_flat(&tree_of(&[(0.0, 0.0, 0.0, None), (0.0, 3.0, 0.0, Some(0))]), &small()).embedding;
+    assert_eq!(pair.positions_mm[1], DVec2::new(0.0, 3.0));
+    assert_eq!(pair.energy.total(), 0.0);
+
+    // Seen end-on: no heading is known, the length still is.
+    let end_on = laid_flat(&tree_of(&[(0.0, 0.0, 0.0, None), (0.0, 0.0, 3.0, Some(0))]), &small()).embedding;
+    assert!((end_on.positions_mm[1].length() - 3.0).abs() < 1e-11);
+}
+
+#[test]
+fn deep_chains_need_no_stack() {
+    let nodes: Vec<_> = (0..50_000_usize)
+        .map(|i| (i as f64, f64::from(i as u32 % 2), f64::from(i as u32 % 3), i.checked_sub(1)))
+        .collect();
+    let params = Params { method: Method::Cone, methods: vec![Method::Radial], ..small() };
+    let embedding = laid_flat(&tree_of(&nodes), &params).embedding;
+    assert_eq!(embedding.method, "cone");
+    assert!(embedding.certificate.holds());
+}
+
+#[test]
+fn a_constructive_method_is_used_as_asked() {
+    // Two arms that cross in the view but not in space.
+    let crossing = tree_of(&[
+        (0.0, 0.0, 0.0, None),
+        (1.0, 0.0, 0.0, Some(0)),
+        (3.0, 2.0, 1.0, Some(1)),
+        (3.0, -2.0, 1.0, Some(2)),
+        (2.0, -1.0, -1.0, Some(1)),
+        (4.0, 1.0, -1.0, Some(4)),
+    ]);
+    for method in [Method::Radial, Method::Cone] {
+        let params = Params { method, methods: Vec::new(), ..small() };
+        let embedded = laid_flat(&crossing, &params);
+        assert_eq!(embedded.embedding.method, method.name());
+        assert_eq!(embedded.embedding.termination, Termination::Constructed);
+        assert!(embedded.report.warnings.is_empty());
+    }
+    let params = Params { method: Method::Projection, methods: Vec::new(), ..small() };
+    let embedded = laid_flat(&crossing, &params);
+    assert_eq!(embedded.embedding.methods[0].crossings, 1);
+    assert_ne!(embedded.embedding.method, "projection");
+    assert_eq!(embedded.report.warnings[0].code, "W-EMBED-OTHER-METHOD");
+    assert!(embedded.report.warnings[0].message.contains("projection has 1 crossings"));
+}
+
+#[test]
+fn overlaps_are_those_of_thick_tubes() {
+    let two_arms = |radius_mm: f64| {
+        let mut nodes = tree_of(&[
+            (0.0, 0.0, 0.0, None),
+            (0.0, 10.0, 0.0, Some(0)),
+            (10.0, 10.0, 0.0, Some(1)),
+            (10.0, 1.0, 0.0, Some(2)),
+            (1.0, 1.0, 0.0, Some(3)),
+        ])
+        .nodes()
+        .to_vec();
+        for node in &mut nodes {
+            node.radius_mm = radius_mm;
+        }
+        let tree = Tree::new(&nodes).expect("a tree");
+        laid_flat(&tree, &small()).embedding.methods[0].overlaps
+    };
+    // A spiral whose tip comes within 1 mm of its first edge: tubes of 0.4 mm pass, tubes of 0.6 mm meet there.
+    assert_eq!(two_arms(0.4), 0);
+    assert_eq!(two_arms(0.6), 1);
+}
+
+#[test]
+fn json_and_tables() {
+    let tree = random_tree(0, 60, 2.0, false, 3);
+    let embedding = laid_flat(&tree, &small()).embedding;
+    let json = embedding.to_json();
+    let back = Embedding::from_json(&json, &tree).expect("our own file");
+    assert_eq!(back.to_json(), json);
+    assert_eq!(back.positions_mm, embedding.positions_mm);
+    assert!(json.starts_with("{\"format\":\"espalier-embedding\",\"version\":1,"));
+
+    let smaller = random_tree(0, 59, 2.0, false, 3);
+    let error = Embedding::from_json(&json, &smaller).expect_err("another tree");
+    assert!(error.to_string().contains("60 numbers, the tree needs 59"), "{error}");
+    let x = format!("{:?}", embedding.positions_mm[1].x);
+    let off = json.replacen(&x, &format!("{x}00001"), 1);
+    assert!(Embedding::from_json(&off, &tree).expect_err("not rounded").to_string().contains("not rounded"));
+    assert!(Embedding::from_json(&json.replacen("version\":1", "version\":2", 1), &tree).is_err());
+
+    let nodes = embedding.nodes_tsv(&tree);
+    let lines: Vec<&str> = nodes.lines().collect();
+    assert_eq!(lines.len(), 61);
+    assert!(
+        lines[0].starts_with("node\tparent\tx_mm\ty_mm\tz_mm\tradius_mm\tu_mm\tv_mm\tbranch\tgeneration")
+    );
+    for (line, position) in lines[1..].iter().zip(&embedding.positions_mm) {
+        let cells: Vec<&str> = line.split('\t').collect();
+        assert_eq!(cells[6].parse(), Ok(position.x), "the table holds the very number");
+        assert_eq!(cells[7].parse(), Ok(position.y));
+    }
+    let compare = MethodRow::to_tsv(&embedding.methods);
+    let lines: Vec<&str> = compare.lines().collect();
+    assert_eq!(lines.len(), 5);
+    assert_eq!(lines[0].split('\t').count(), 16);
+    assert!(lines[4].starts_with("pso 24x8 n\t0\t"));
+}
+
+#[test]
+fn bad_input_is_named() {
+    let tree = random_tree(1, 30, 1.0, false, 3);
+    let mut views = views_along(&tree, DVec3::Z);
+    views.chains.pop();
+    let error = embed(&tree, &views, &small(), 0, &|_| {}).expect_err("a plane is missing");
+    assert!(matches!(error, Error::Views { .. }), "{error}");
+
+    let views = views_along(&tree, DVec3::Z);
+    let error_of = |params: Params| embed(&tree, &views, &params, 0, &|_| {}).expect_err("a bad parameter");
+    for (params, key) in [
+        (Params { particles: 2, ..small() }, "particles"),
+        (Params { w_angle: f64::NAN, ..small() }, "w_angle"),
+        (Params { omega_g: -0.1, ..small() }, "omega_g"),
+        (Params { w_crossing: CrossingWeight::Fixed(0.0), ..small() }, "w_crossing"),
+        (Params { memory_mib: 0, ..small() }, "memory_mib"),
+    ] {
+        let error = error_of(params);
+        assert_eq!(error.class(), Class::Usage);
+        assert!(matches!(&error, Error::Param(param) if param.key == key), "{error}");
+    }
+    let huge = Params { particles: 1_000_000, memory_mib: 64, ..small() };
+    assert_eq!(error_of(huge).class(), Class::Limit);
+
+    // Lengths over sixteen decades: the shortest vanish in twelve digits.
+    let nodes: Vec<_> = (0..20_usize)
+        .map(|i| (if i == 0 { 1e9 } else { 1e-7 * i as f64 }, i as f64 * 1e-7, 0.0, i.checked_sub(1)))
+        .collect();
+    let tree = tree_of(&nodes);
+    let error =
+        embed(&tree, &views_along(&tree, DVec3::Z), &small(), 0, &|_| {}).expect_err("rounds to nothing");
+    assert_eq!(error.class(), Class::Uncertified);
+}
+
+#[test]
+fn params_read_and_write() {
+    let written = serde_json::to_string(&Params::paper()).expect("plain numbers");
+    assert!(written.contains("\"targets\":\"projected\"") && written.contains("\"w_crossing\":\"auto\""));
+    assert_eq!(serde_json::from_str::<Params>(&written).expect("the same"), Params::paper());
+    let set: Params = serde_json::from_str("{\"w_crossing\": 3, \"methods\": [\"radial\"]}").expect("legal");
+    assert_eq!(set.w_crossing, CrossingWeight::Fixed(3.0));
+    assert_eq!(set.methods, [Method::Radial]);
+    let error = serde_json::from_str::<Params>("{\"w_crossing\": \"cheap\"}").expect_err("not auto");
+    assert!(error.to_string().contains("expected \"auto\" or a number"), "{error}");
+    assert!(serde_json::from_str::<Params>("{\"particels\": 3}").is_err());
+    Params::paper().validate().expect("the paper's values are legal");
+    assert_eq!(Params::paper().targets, TargetMode::Projected);
+}
