@@ -141,7 +141,7 @@ impl DistanceField {
             let mut values = values.iter();
             for &start in starts {
                 let mut cell = start;
-                let end = start + (self.shape[axis] - place_in(start, stride, self.shape[axis])) * stride;
+                let end = start + (self.shape[axis] - start / stride % self.shape[axis]) * stride;
                 while cell < end && self.squared[cell] != 0.0 {
                     self.squared[cell] = values.next().copied().unwrap_or(0.0);
                     cell += stride;
@@ -157,10 +157,6 @@ impl DistanceField {
         heights.extend(run.take_while(|&height| height != 0.0));
         heights.len() < limit
     }
-}
-
-fn place_in(cell: usize, stride: usize, extent: usize) -> usize {
-    cell / stride % extent
 }
 
 /// The 27 offsets of a neighbourhood, z slowest.

@@ -92,12 +92,12 @@ fn measure(
     };
     let border_mm = distance_to_border(grid, center);
     // Without any background the border of the scan is all there is to measure.
-    let distance_mm = if distance_mm.is_finite() { distance_mm } else { border_mm };
-    let radius_mm = (distance_mm + params.offset_voxels * spacing.min_element()).max(0.0);
+    let known = |distance_mm: f64| if distance_mm.is_finite() { distance_mm } else { border_mm };
+    let radius_mm = (known(distance_mm) + params.offset_voxels * spacing.min_element()).max(0.0);
     Sphere {
         center_mm: grid.world_from_voxel().transform_point3(center / spacing),
         radius_mm,
-        distance_mm: field.distance_mm(voxel).min(1e9),
+        distance_mm: known(field.distance_mm(voxel)),
         area_radius_mm: tangent
             .and_then(|tangent| section::area_radius_mm(mask, center, tangent, radius_mm))
             .unwrap_or(f64::NAN),

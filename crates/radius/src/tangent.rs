@@ -17,9 +17,11 @@ use crate::distance::{DistanceField, neighborhood};
 const MIN_WINDOW: f64 = 3.0;
 /// The window in units of the local distance: the direction of a thick branch changes slowly.
 const WINDOW_PER_DISTANCE: f64 = 1.0;
+/// The longest window in units of the largest spacing: it bounds the work in bodies that are no branches.
+const MAX_WINDOW: f64 = 12.0;
 /// Share of the variance that a direction must hold: at a right-angled crossing the larger of two is a half.
-const MIN_SHARE: f64 = 0.8;
-/// Squarings of the covariance: 2⁶ power iterations, so that a share of 0.8 leaves nothing of the rest.
+const MIN_SHARE: f64 = 0.65;
+/// Squarings of the covariance: 2⁶ power iterations, so that a share of 0.65 leaves nothing of the rest.
 const N_SQUARINGS: usize = 6;
 
 /// The direction at each skeleton voxel.
@@ -31,7 +33,8 @@ pub(crate) fn tangents(skeleton: &Skeleton, field: &DistanceField) -> Vec<Option
         .into_par_iter()
         .map(|start| {
             let distance = field.distance_mm(voxels[start].map(i64::from)).min(1e9);
-            let window = (MIN_WINDOW * field.spacing_mm().max_element()).max(WINDOW_PER_DISTANCE * distance);
+            let unit = field.spacing_mm().max_element();
+            let window = (WINDOW_PER_DISTANCE * distance).clamp(MIN_WINDOW * unit, MAX_WINDOW * unit);
             let points = connected_within(start, window, &neighbors, &positions);
             principal_axis(&points)
         })

@@ -4,8 +4,10 @@
 //! |--:|---|---|
 //! | 1 | `lattice` | crop the mask to its foreground, turn its axes to RAS, pad it with background |
 //! | 2 | `euler`, `simple` | what a voxel's 26 neighbours say: end point, Euler invariance, simplicity |
-//! | 3 | `thinning` | peel border voxels from six sides until nothing changes |
-//! | 4 | `topology` | count components and the Euler number before and after, for the report |
+//! | 3 | `depth` | how deep each voxel lies, in mm: the order of peeling (`safe`) |
+//! | 4 | `thinning` | peel border voxels from six sides until nothing changes |
+//! | 5 | `tips` | give tips back what the sub-iterations took too much (`safe`) |
+//! | 6 | `topology` | components and Euler number before and after, for the report |
 //!
 //! Connectivity is 26 for the foreground and 6 for the background throughout.
 //!
@@ -20,11 +22,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod depth;
 mod error;
+mod params;
+
+mod depth;
 mod euler;
 mod lattice;
-mod params;
 mod simple;
 mod thinning;
 mod tips;

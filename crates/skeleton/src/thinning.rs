@@ -3,13 +3,22 @@
 //! **Input** a lattice. **Output** the same lattice with the skeleton left; the number of sweeps.
 //! **Notation** d the direction of a sub-iteration; a voxel is *border* for d if v + d is background.
 //! **Steps** Sweep until nothing is deleted; in each sweep, for each of the six d:
-//! 1. collect, with the volume frozen and in raster order, the border voxels that are no end points, Euler
-//!    invariant and simple; 2. recheck them with the volume live and delete those that still qualify.
-//! **Guarantees** a fixed order, so one result. For `safe`: see [`recheck_safe`].
-//! **Source** [Lee94] section 5; direction order as in scikit-image and ITK.
-//! **Differs from the source** only in speed for `lee94`: a list of *open* voxels stands for the whole volume.
-//! The predicate of step 1 depends on the 26 neighbours alone, so a voxel found wanting leaves the list until one
-//! of them is deleted. `safe` has a recheck of its own.
+//! 1. Collect, with the volume frozen and in raster order, the border voxels that are no end points, Euler
+//!    invariant and simple.
+//! 2. Recheck them with the volume live and delete those that still qualify.
+//!
+//! `lee94` sweeps over all voxels at once. `safe` sweeps level by level of [`crate::depth`], rechecks as
+//! [`recheck_safe`] says, and regrows the tips ([`crate::tips`]).
+//!
+//! **Guarantees** a fixed order, so one result. `safe` deletes only voxels that are simple in the full sense at the
+//! moment of their deletion, so it keeps components, tunnels and cavities, and no component vanishes.
+//! **Source** [Lee94] section 5; direction order as in scikit-image and ITK. Levels of distance: [Pudney1998].
+//! **Differs from the source** for `lee94` only in speed: a list of *open* voxels stands for the whole volume. The
+//! predicate of step 1 depends on the 26 neighbours alone, so a voxel found wanting leaves the list until one of
+//! them is deleted.
+//! **Why not** the published order with a stricter recheck? Peeling box-like, six faces a sweep, it takes 1.4 voxels
+//! a sweep from an oblique end and 1 from a flat side: tubes of width 9 lost 4 voxels more than their width.
+//! **Why not** keep voxels with two neighbours as ends? It keeps the length too, at twice the spurs on real airways.
 //! **Cost** O(foreground) predicates and memory; O(open voxels) look-ups a sub-iteration.
 
 use crate::depth::{UNITS_PER_SPACING, depths};

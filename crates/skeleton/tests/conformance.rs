@@ -1,4 +1,10 @@
 //! `lee94` in stored order equals scikit-image's `skeletonize(method = "lee")`, voxel for voxel.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "tests say what they found, and fail aloud"
+)]
 
 mod common;
 

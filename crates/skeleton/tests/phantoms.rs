@@ -1,4 +1,10 @@
 //! Bodies whose skeletons are known: lines, bars, tubes, rings, balls.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "tests say what they found, and fail aloud"
+)]
 
 mod common;
 

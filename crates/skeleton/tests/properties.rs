@@ -1,4 +1,10 @@
 //! What holds for the skeleton of any mask.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "tests say what they found, and fail aloud"
+)]
 
 mod common;
 

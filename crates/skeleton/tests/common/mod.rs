@@ -1,4 +1,10 @@
 //! Shared by the test files: a reader for the NIfTI files of the test data, and phantoms.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "tests say what they found, and fail aloud"
+)]
 #![allow(dead_code, reason = "each test file uses its own part")]
 #![allow(clippy::disallowed_methods, reason = "tests find the real data by ESPALIER_DATA")]
 
@@ -9,7 +15,7 @@ use espalier_model::{Grid, Mask};
 use glam::DVec3;
 
 /// The folder of real data; `None`, said aloud, if the environment names none.
-pub fn data_folder() -> Option<PathBuf> {
+pub(crate) fn data_folder() -> Option<PathBuf> {
     let folder = std::env::var("ESPALIER_DATA").ok().filter(|folder| !folder.is_empty()).map(PathBuf::from);
     if folder.is_none() {
         println!("skipped: ESPALIER_DATA not set");
@@ -19,7 +25,7 @@ pub fn data_folder() -> Option<PathBuf> {
 
 /// A mask of the nonzero voxels of a little-endian 8- or 16-bit NIfTI-1 file, with its spacing but no other
 /// geometry.
-pub fn read_mask(path: &Path) -> Mask {
+pub(crate) fn read_mask(path: &Path) -> Mask {
     let compressed = std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let mut bytes = Vec::new();
     flate2::read::MultiGzDecoder::new(&compressed[..]).read_to_end(&mut bytes).expect("gzip");
@@ -34,7 +40,7 @@ pub fn read_mask(path: &Path) -> Mask {
 }
 
 /// A mask on a grid of spacing 1 from a predicate of the voxel coordinates.
-pub fn mask_of(shape: [usize; 3], inside: impl Fn(DVec3) -> bool) -> Mask {
+pub(crate) fn mask_of(shape: [usize; 3], inside: impl Fn(DVec3) -> bool) -> Mask {
     let grid = Grid::axis_aligned(shape, DVec3::ONE, DVec3::ZERO).expect("grid");
     let voxels = (0..grid.n_voxels())
         .map(|index| inside(DVec3::from_array(grid.voxel(index).map(|c| c as f64))))
@@ -43,7 +49,7 @@ pub fn mask_of(shape: [usize; 3], inside: impl Fn(DVec3) -> bool) -> Mask {
 }
 
 /// The skeleton as a mask on the same grid.
-pub fn skeleton_mask(mask: &Mask, params: &espalier_skeleton::Params) -> Mask {
+pub(crate) fn skeleton_mask(mask: &Mask, params: &espalier_skeleton::Params) -> Mask {
     let thinned = espalier_skeleton::skeletonize(mask, params).expect("not empty");
     let mut out = Mask::empty(mask.grid().clone());
     for voxel in thinned.skeleton.voxels() {
@@ -54,7 +60,7 @@ pub fn skeleton_mask(mask: &Mask, params: &espalier_skeleton::Params) -> Mask {
 }
 
 /// 26-connected components and Euler number, counted cell by cell, apart from the crate's own code.
-pub fn topology(mask: &Mask) -> (usize, i32) {
+pub(crate) fn topology(mask: &Mask) -> (usize, i32) {
     let grid = mask.grid();
     let mut cells = std::collections::BTreeSet::new();
     let mut left = std::collections::BTreeSet::new();
