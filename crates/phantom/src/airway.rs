@@ -1,6 +1,6 @@
 //! The airways of a human: trachea and lobar bronchi by anatomy, the rest grown into the lungs.
 //!
-//! **Input** [`Params`] (`size`, `generations`, `min_radius_mm`, `clearance_mm`), a seed. **Output** [`Shape`].
+//! **Input** [`Params`] (`generations`, `min_radius_mm`, `clearance_mm`), a seed, the attempt. **Output** [`Shape`].
 //! **Spaces** RAS mm, the carina at the origin, the trachea upwards; the right lung at +x.
 //! **Steps** 1. scatter points over both lungs, sort them by lobe; 2. lay the [`TEMPLATE`], each branch as thick as
 //! its share of the points asks by Murray's law; 3. grow each lobe.
@@ -64,14 +64,14 @@ const TEMPLATE: [Named; 10] = [
     named(5, (20.0, 3), [-0.55, 0.68, -0.48], &[Lobe::Lingula]),
 ];
 
-/// Grows the airways of a seed.
-pub(crate) fn shape(params: &Params, seed: u64) -> Shape {
-    let clouds = clouds(params, seed);
+/// Grows the airways of a seed's attempt, at size 1.
+pub(crate) fn shape(params: &Params, seed: u64, attempt: u32) -> Shape {
+    let clouds = clouds(params, seed, attempt);
     let mut shape = Shape::default();
     let mut growth = Growth {
         shape: &mut shape,
         occupied: Occupied::default(),
-        stream: Stream::new(seed, Purpose::PhantomShape, 0, 1),
+        stream: Stream::new(seed, Purpose::PhantomShape, 0, 2 * attempt + 1),
     };
     let buds = lay_template(&mut growth, &clouds, params.generations);
     let depth = |p: DVec3| lungs::depth_mm(Side::Right, p).max(lungs::depth_mm(Side::Left, p));
@@ -82,7 +82,6 @@ pub(crate) fn shape(params: &Params, seed: u64) -> Shape {
         clearance_mm: params.clearance_mm,
     };
     growth.grow(buds, &rules);
-    shape.scale(params.size);
     shape
 }
 
@@ -106,13 +105,13 @@ fn lay_template(growth: &mut Growth<'_>, clouds: &[(Lobe, Vec<DVec3>)], generati
 }
 
 /// The points that the airways are to serve, by lobe, in the order of the lobes.
-fn clouds(params: &Params, seed: u64) -> Vec<(Lobe, Vec<DVec3>)> {
+fn clouds(params: &Params, seed: u64, attempt: u32) -> Vec<(Lobe, Vec<DVec3>)> {
     let mut clouds: Vec<(Lobe, Vec<DVec3>)> =
         RIGHT.iter().chain(&LEFT).map(|&lobe| (lobe, Vec::new())).collect();
     // About forty points for each of the finest branches.
     let n_points = 20 << params.generations.clamp(7, 13);
     for (side_idx, side) in [Side::Right, Side::Left].into_iter().enumerate() {
-        let mut stream = Stream::new(seed, Purpose::PhantomShape, side_idx as u32, 0);
+        let mut stream = Stream::new(seed, Purpose::PhantomShape, side_idx as u32, 2 * attempt);
         // Equal numbers for equal volumes: scatter over the same box size, keep what falls inside.
         let share = if side == Side::Right { n_points } else { n_points * 9 / 10 };
         for p in scatter(side.bounds(), share, |p| lungs::depth_mm(side, p), &mut stream) {

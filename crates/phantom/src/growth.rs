@@ -9,7 +9,7 @@
 //! 3. give each child the radius r · share^(1/3), so that Σ r³ is kept (Murray's law);
 //! 4. send each child towards the middle of its half, at a bounded angle, for a bounded multiple of its diameter;
 //! 5. accept the pair if both ends lie inside and both keep their distance from all other branches, else turn u
-//!    and try again; after [`N_ATTEMPTS`] the branch stays a tip.
+//!    and try again, then try shorter children; if nothing fits, the branch stays a tip.
 //!
 //! **Guarantees** every fork has two children and keeps Σ r³; no two branches that are not neighbours come nearer
 //! than the clearance; the result depends on the seed alone.
@@ -27,18 +27,20 @@ use glam::DVec3;
 use crate::clearance::Occupied;
 use crate::shape::Shape;
 
-/// How often a fork is tried, each time with its plane turned further.
-const N_ATTEMPTS: u32 = 12;
+/// How often a fork is tried at a length, each time with its plane turned further.
+const N_TURNS: u32 = 12;
+/// The lengths at which a fork is tried, as shares of the wanted one: near a wall shorter branches still fit.
+const SHARES: [f64; 3] = [1.0, 0.75, 0.55];
 /// Directions that are compared for the split, over a half turn.
 const N_DIRECTIONS: u32 = 12;
-/// The angles between a child and its parent's line, in radians: 12° to 62°.
-const CHILD_ANGLE: [f64; 2] = [0.21, 1.08];
-/// The least angle between siblings in radians: 55°. Below it a voxel mask bridges the crotch.
-const SIBLING_ANGLE: f64 = 0.96;
+/// The angles between a child and its parent's line, in radians: 12° to 65°.
+const CHILD_ANGLE: [f64; 2] = [0.21, 1.13];
+/// The least angle between siblings in radians: 69°. Below it a voxel mask may bridge the crotch.
+const SIBLING_ANGLE: f64 = 1.2;
 /// Length of a branch over its diameter.
-const LENGTH_RATIO: [f64; 2] = [2.0, 4.2];
+const LENGTH_RATIO: [f64; 2] = [2.4, 4.8];
 /// Share of the way to the middle of its cloud that a branch goes.
-const REACH: f64 = 0.45;
+const REACH: f64 = 0.52;
 
 /// What bounds the growth.
 pub(crate) struct Rules<'a> {
@@ -90,23 +92,30 @@ impl Growth<'_> {
             if bud.generation >= rules.generations || bud.cloud.len() < 2 {
                 continue;
             }
-            let first_angle = self.widest_angle(&bud);
-            for attempt in 0..N_ATTEMPTS {
-                // Turn the plane to and fro about the best one.
-                let swing = f64::from(attempt.div_ceil(2)) * PI / f64::from(N_ATTEMPTS);
-                let angle = first_angle + if attempt % 2 == 0 { swing } else { -swing };
-                let Some(pair) = self.sprout(&mut bud, angle, rules) else { continue };
-                let is_clear =
-                    |s: &Sprout| self.occupied.is_clear(&s.balls[1..], bud.branch, rules.clearance_mm);
-                if pair.iter().all(is_clear) {
-                    let normal = pair[0].direction.cross(pair[1].direction).normalize_or(bud.normal);
-                    for sprout in pair {
-                        queue.push_back(self.plant(&bud, sprout, normal));
-                    }
-                    break;
-                }
+            if let Some([first, second]) = self.fitting_pair(&mut bud, rules) {
+                let normal = first.direction.cross(second.direction).normalize_or(bud.normal);
+                queue.push_back(self.plant(&bud, first, normal));
+                queue.push_back(self.plant(&bud, second, normal));
             }
         }
+    }
+
+    /// The first pair of children that lies inside and keeps its distance, if there is one.
+    fn fitting_pair(&mut self, bud: &mut Bud, rules: &Rules<'_>) -> Option<[Sprout; 2]> {
+        let first_angle = self.widest_angle(bud);
+        for (length_share, turn) in
+            SHARES.iter().flat_map(|&share| (0..N_TURNS).map(move |turn| (share, turn)))
+        {
+            // Turn the plane to and fro about the best one.
+            let swing = f64::from(turn.div_ceil(2)) * PI / f64::from(N_TURNS);
+            let angle = first_angle + if turn % 2 == 0 { swing } else { -swing };
+            let Some(pair) = self.sprout(bud, (angle, length_share), rules) else { continue };
+            let is_clear = |s: &Sprout| self.occupied.is_clear(&s.balls[1..], bud.branch, rules.clearance_mm);
+            if pair.iter().all(is_clear) {
+                return Some(pair);
+            }
+        }
+        None
     }
 
     /// Adds a chain from `hub` and returns its branch number and last node. `balls[0]` is the hub.
@@ -142,40 +151,38 @@ impl Growth<'_> {
     }
 
     /// The two children for a split across the direction at `angle`, if both end inside and are thick enough.
-    fn sprout(&mut self, bud: &mut Bud, angle: f64, rules: &Rules<'_>) -> Option<[Sprout; 2]> {
+    fn sprout(
+        &mut self,
+        bud: &mut Bud,
+        (angle, length_share): (f64, f64),
+        rules: &Rules<'_>,
+    ) -> Option<[Sprout; 2]> {
         let u = across_at(axes_about(bud.direction, bud.normal), angle);
         bud.cloud.sort_by(|p, q| q.dot(u).total_cmp(&p.dot(u)));
         let n_points = bud.cloud.len();
         let quantile = self.stream.uniform(0.35, 0.65);
         let n_first = ((quantile * n_points as f64) as usize).clamp(1, n_points - 1);
         let halves = [&bud.cloud[..n_first], &bud.cloud[n_first..]];
-        let radius = self.shape.nodes[bud.node].radius_mm;
-        let share = |half: &[DVec3]| radius * math::cbrt(half.len() as f64 / n_points as f64);
-        let radii = halves.map(share);
+        let (hub, radius) = (self.shape.nodes[bud.node].position_mm, self.shape.nodes[bud.node].radius_mm);
+        let radii = halves.map(|half| radius * math::cbrt(half.len() as f64 / n_points as f64));
         if radii[0].min(radii[1]) < rules.min_radius_mm {
             return None;
         }
-        let hub = self.shape.nodes[bud.node].position_mm;
         let middles = halves.map(mean);
         let directions = child_directions(bud.direction, u, middles.map(|middle| middle - hub));
-        let clouds = halves.map(<[DVec3]>::to_vec);
-        let [first_cloud, second_cloud] = clouds;
-        let mut child = |idx: usize, cloud: Vec<DVec3>| {
-            let wanted = REACH * hub.distance(middles[idx]);
+        let mut child = |idx: usize| {
             let diameter = 2.0 * radii[idx];
-            let length = wanted.clamp(LENGTH_RATIO[0] * diameter, LENGTH_RATIO[1] * diameter)
-                * self.stream.uniform(0.9, 1.1);
+            let wanted = (REACH * hub.distance(middles[idx]))
+                .clamp(LENGTH_RATIO[0] * diameter, LENGTH_RATIO[1] * diameter);
+            let length_mm = length_share * wanted * self.stream.uniform(0.9, 1.1);
             let path = Path { hub: (hub, radius), arrival: bud.direction, direction: directions[idx] };
-            let balls = path.bent(length, radii[idx], &mut self.stream);
-            let tip = balls[balls.len() - 1].0;
-            let direction = (tip - balls[balls.len() - 2].0).normalize_or(directions[idx]);
-            ((rules.depth)(tip) > radii[idx] + rules.clearance_mm).then_some(Sprout {
-                balls,
-                direction,
-                cloud,
-            })
+            let balls = path.bent(length_mm, radii[idx], &mut self.stream);
+            let (tip, before) = (balls[balls.len() - 1].0, balls[balls.len() - 2].0);
+            let direction = (tip - before).normalize_or(directions[idx]);
+            let is_inside = (rules.depth)(tip) > radii[idx] + rules.clearance_mm;
+            is_inside.then(|| Sprout { balls, direction, cloud: halves[idx].to_vec() })
         };
-        Some([child(0, first_cloud)?, child(1, second_cloud)?])
+        Some([child(0)?, child(1)?])
     }
 }
 
@@ -195,9 +202,9 @@ impl Path {
     pub(crate) fn bent(&self, length_mm: f64, radius_mm: f64, stream: &mut Stream) -> Vec<(DVec3, f64)> {
         let (start, hub_radius) = self.hub;
         let end = start + length_mm * self.direction;
-        let leaving = (self.direction + 0.25 * self.arrival).normalize_or(self.direction);
+        let leaving = (self.direction + 0.12 * self.arrival).normalize_or(self.direction);
         let (side, other) = axes_about(self.direction, self.arrival);
-        let bow = length_mm * (stream.uniform(-0.07, 0.07) * side + stream.uniform(-0.07, 0.07) * other);
+        let bow = length_mm * (stream.uniform(-0.05, 0.05) * side + stream.uniform(-0.05, 0.05) * other);
         let control = start + 0.5 * length_mm * leaving + bow;
         let flare_end = (0.95 * hub_radius / length_mm).clamp(0.08, 0.45);
         let n_steps = ((1.0 - flare_end) * length_mm / (1.2 * radius_mm)).ceil().clamp(2.0, 16.0) as u32;

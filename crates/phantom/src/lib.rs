@@ -5,6 +5,7 @@
 //! | 1 | `tubes` | the closed forms: straight, bent and helical tubes, Y, torus, comb |
 //! | 1 | `airway`, `vessel` | a trunk by anatomy, then a tree grown (`growth`, `clearance`) into `lungs` or liver |
 //! | 1 | `neuron` | a wandering tree of an exact number of nodes |
+//! | 1 | `topology` | grown anew until the mask has no false loop |
 //! | 2 | `shape` → `body` | nodes, rounded; the union of round cones about them |
 //! | 3 | `raster`, `rough` | the mask: voxels whose centre lies in the body; roughened if asked |
 //! | 4 | `tissue`, `scene`, `texture`, `companions` | the CT: partial volume, surroundings, blur, noise |
@@ -35,6 +36,7 @@ mod scene;
 mod shape;
 mod texture;
 mod tissue;
+mod topology;
 mod truth;
 mod tubes;
 mod vessel;
@@ -113,8 +115,8 @@ pub fn rasterise(tree: &Tree, params: &Params, seed: u64) -> Result<Mask, Error>
 fn shape_and_truth(kind: Kind, params: &Params, seed: u64) -> Result<(Shape, Truth), Error> {
     params.validate()?;
     let (mut shape, closed_form) = match kind {
-        Kind::Airway => (airway::shape(params, seed), None),
-        Kind::Vessel => (vessel::shape(params, seed), None),
+        Kind::Airway => (grown(kind, params, |attempt| airway::shape(params, seed, attempt))?, None),
+        Kind::Vessel => (grown(kind, params, |attempt| vessel::shape(params, seed, attempt))?, None),
         Kind::Neuron => (neuron::shape(params.n_nodes, seed)?, None),
         _ => tubes::shape(kind, params).map(|(shape, truth)| (shape, Some(truth)))?,
     };
@@ -130,6 +132,13 @@ fn shape_and_truth(kind: Kind, params: &Params, seed: u64) -> Result<(Shape, Tru
         band_hu: scene::lumen_band(kind),
     });
     Ok((shape, truth))
+}
+
+/// A grown tree without false loops, at the size asked for.
+fn grown(kind: Kind, params: &Params, grow: impl Fn(u32) -> Shape) -> Result<Shape, Error> {
+    let mut shape = topology::first_ball(scene::bounds(kind).unwrap_or_default(), grow)?;
+    shape.scale(params.size);
+    Ok(shape)
 }
 
 /// The mask of a body on a grid about `bounds` (at size 1) or else about the body.

@@ -47,7 +47,7 @@ pub(crate) fn cylinder_depth(p: DVec3, center: [f64; 2], semi_axes: [f64; 2]) ->
 
 /// About how deep `p` lies in the heart.
 pub(crate) fn heart_depth(p: DVec3) -> f64 {
-    ellipsoid_depth(p, DVec3::new(-20.0, 26.0, -66.0), DVec3::new(52.0, 40.0, 46.0))
+    ellipsoid_depth(p, DVec3::new(-15.0, 27.0, -68.0), DVec3::new(49.0, 38.0, 42.0))
 }
 
 /// About how deep `p` lies in the tissue between the lungs, the heart apart.

@@ -31,10 +31,11 @@ const SOMA_RADIUS_MM: f64 = 0.007;
 const NEURITE_RADIUS_MM: [f64; 2] = [0.000_3, 0.002_5];
 /// Stems, the axon among them.
 const N_STEMS: usize = 6;
-/// One tip is wanted for so many nodes.
-const NODES_PER_TIP: usize = 13;
-/// The fewest steps between two forks.
-const MIN_BRANCH_STEPS: u32 = 4;
+/// One tip is wanted for so many nodes in a neuron of 235 nodes. It grows with the fourth root of the number of
+/// nodes, since larger tracings have longer branches: 3 % of the nodes of a large neuron are tips.
+const NODES_PER_TIP: f64 = 11.0;
+/// The fewest steps between two forks, as a share of the nodes per tip.
+const MIN_BRANCH_SHARE: f64 = 0.33;
 /// Directions compared for a step.
 const N_CANDIDATES: u32 = 5;
 /// The size of a cell of the neighbour search, in mm: as far as a tip feels others.
@@ -70,6 +71,7 @@ pub(crate) fn shape(n_nodes: usize, seed: u64) -> Result<Shape, Error> {
     let soma = growth.place(None, DVec3::ZERO, SOMA);
     let mut tips = growth.stems(soma);
     let mut n_tips = tips.len();
+    let nodes_per_tip = NODES_PER_TIP * math::pow((n_nodes as f64 / 235.0).max(1.0), 0.25);
     while growth.shape.nodes.len() < n_nodes {
         let n_grown = growth.shape.nodes.len();
         let Some(mut tip) = tips.pop_front() else {
@@ -83,7 +85,8 @@ pub(crate) fn shape(n_nodes: usize, seed: u64) -> Result<Shape, Error> {
             }
             continue;
         }
-        let wants_fork = n_tips * NODES_PER_TIP < n_grown && tip.n_steps >= MIN_BRANCH_STEPS;
+        let wants_fork = n_tips as f64 * nodes_per_tip < n_grown as f64
+            && f64::from(tip.n_steps) >= MIN_BRANCH_SHARE * nodes_per_tip;
         if wants_fork && growth.stream.unit() < 0.3 {
             n_tips += 1;
             tips.extend(growth.fork(&tip));

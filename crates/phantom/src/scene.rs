@@ -3,6 +3,7 @@
 //! **Spaces** points are RAS mm, divided by the anatomy's size first.
 //! **Source** HU as in a textbook: air −1000, lung −850, fat −100, water 0, blood 45, muscle 50, bone 300 and more.
 
+use espalier_geom::math;
 use glam::DVec3;
 
 use crate::lungs::{self, Side, cylinder_depth, ellipsoid_depth};
@@ -73,13 +74,12 @@ pub(crate) fn lumen_band(kind: Kind) -> [f64; 2] {
 fn thorax(p: DVec3, texture: &Texture) -> f64 {
     // The shoulders narrow towards the neck.
     let narrowing = 1.0 - 0.22 * smooth_step(60.0, 125.0, p.z);
-    let rim = ((p.x / (158.0 * narrowing)).powi2_sum((p.y + 2.0) / (106.0 * narrowing))).sqrt();
+    let rim = math::hypot(p.x / (158.0 * narrowing), (p.y + 2.0) / (106.0 * narrowing));
     if let Some(hu) = trunk_wall(p, rim, 0.30) {
         return hu;
     }
     let oesophagus = ellipsoid_depth(p, DVec3::new(-7.0, -19.0, 48.0), DVec3::new(5.0, 3.5, 15.0));
-    let stomach = ellipsoid_depth(p, DVec3::new(-72.0, 30.0, -128.0), DVec3::new(30.0, 24.0, 13.0));
-    if oesophagus > 0.0 || stomach > 0.0 {
+    if oesophagus > 0.0 {
         return AIR;
     }
     let side = if p.x > 0.0 { Side::Right } else { Side::Left };
@@ -96,11 +96,23 @@ fn thorax(p: DVec3, texture: &Texture) -> f64 {
         return BLOOD + 5.0 * texture.at(p);
     }
     if lungs::diaphragm_depth(side, p) > 0.0 {
-        // The liver fills the right dome, spleen and fat the left one.
-        let is_organ = side == Side::Right || texture.at(0.4 * p) > -0.2;
-        return if is_organ { 58.0 + 6.0 * texture.at(p) } else { FAT };
+        return below_diaphragm(p, side, texture);
     }
     if rim > 0.8 { MUSCLE } else { -35.0 + 60.0 * texture.at(p) }
+}
+
+/// The liver fills the right dome; spleen and stomach lie in the left one, the stomach's gas on top as in a patient
+/// who lies on the back.
+fn below_diaphragm(p: DVec3, side: Side, texture: &Texture) -> f64 {
+    let spleen = ellipsoid_depth(p, DVec3::new(-88.0, -34.0, -128.0), DVec3::new(28.0, 36.0, 34.0));
+    let stomach = ellipsoid_depth(p, DVec3::new(-62.0, 26.0, -134.0), DVec3::new(46.0, 42.0, 30.0));
+    match side {
+        Side::Right => 58.0 + 6.0 * texture.at(p),
+        Side::Left if stomach > 3.0 && p.y > 38.0 => AIR,
+        Side::Left if stomach > 3.0 => 12.0,
+        Side::Left if spleen.max(stomach) > 0.0 => MUSCLE,
+        Side::Left => FAT,
+    }
 }
 
 /// Aerated lung: denser towards the back, where gravity draws the blood, and patchy.
@@ -109,7 +121,7 @@ fn lung(p: DVec3, texture: &Texture) -> f64 {
 }
 
 fn abdomen(p: DVec3, texture: &Texture) -> f64 {
-    let rim = ((p.x + 8.0) / 134.0).powi2_sum((p.y + 12.0) / 98.0).sqrt();
+    let rim = math::hypot((p.x + 8.0) / 134.0, (p.y + 12.0) / 98.0);
     if let Some(hu) = trunk_wall(p, rim, 0.42) {
         return hu;
     }
@@ -126,14 +138,11 @@ fn abdomen(p: DVec3, texture: &Texture) -> f64 {
     if aorta > 0.0 || right_kidney.max(left_kidney) > 0.0 {
         return 195.0 + 10.0 * texture.at(p);
     }
-    let bowel_gas = ellipsoid_depth(p, DVec3::new(-40.0, 52.0, -52.0), DVec3::new(30.0, 16.0, 14.0));
+    let bowel_gas = ellipsoid_depth(p, DVec3::new(-40.0, 44.0, -54.0), DVec3::new(30.0, 15.0, 14.0));
     if bowel_gas > 0.0 {
         return AIR;
     }
-    match spleen > 0.0 {
-        true => 120.0 + 6.0 * texture.at(p),
-        false => FAT + 12.0 * texture.at(p),
-    }
+    if spleen > 0.0 { 120.0 + 6.0 * texture.at(p) } else { FAT + 12.0 * texture.at(p) }
 }
 
 /// Air around the trunk, skin, fat, ribs, sternum and muscle; `None` inside. `rim` is 1 at the skin.
@@ -174,15 +183,4 @@ fn spine(p: DVec3, center: [f64; 2]) -> Option<f64> {
 fn smooth_step(low: f64, high: f64, value: f64) -> f64 {
     let t = ((value - low) / (high - low)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
-}
-
-/// x² + y², where either is a long expression.
-trait SquareSum {
-    fn powi2_sum(self, other: Self) -> Self;
-}
-
-impl SquareSum for f64 {
-    fn powi2_sum(self, other: Self) -> Self {
-        self * self + other * other
-    }
 }

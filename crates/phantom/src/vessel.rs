@@ -1,6 +1,6 @@
 //! A contrast-filled vein of the liver that follows Murray's law.
 //!
-//! **Input** [`Params`] (`size`, `generations`, `min_radius_mm`, `clearance_mm`), a seed. **Output** [`Shape`].
+//! **Input** [`Params`] (`generations`, `min_radius_mm`, `clearance_mm`), a seed, the attempt. **Output** [`Shape`].
 //! **Spaces** RAS mm, the middle of the liver at the origin.
 //! **Guarantees** r³ of a parent is the sum of its children's r³ [Murray1926].
 
@@ -34,9 +34,9 @@ pub(crate) fn liver_depth(p: DVec3) -> f64 {
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Grows the vein of a seed.
-pub(crate) fn shape(params: &Params, seed: u64) -> Shape {
-    let mut stream = Stream::new(seed, Purpose::PhantomShape, 0, 0);
+/// Grows the vein of a seed's attempt, at size 1.
+pub(crate) fn shape(params: &Params, seed: u64, attempt: u32) -> Shape {
+    let mut stream = Stream::new(seed, Purpose::PhantomShape, 0, 2 * attempt);
     let bounds = (DVec3::new(-102.0, -60.0, -60.0), DVec3::new(90.0, 60.0, 60.0));
     let cloud = scatter(bounds, 20 << params.generations.clamp(7, 13), liver_depth, &mut stream);
 
@@ -45,7 +45,7 @@ pub(crate) fn shape(params: &Params, seed: u64) -> Shape {
     let mut growth = Growth {
         shape: &mut shape,
         occupied: Occupied::default(),
-        stream: Stream::new(seed, Purpose::PhantomShape, 0, 1),
+        stream: Stream::new(seed, Purpose::PhantomShape, 0, 2 * attempt + 1),
     };
     let direction = TRUNK_DIRECTION.normalize();
     let path = Path { hub: (TRUNK_START, TRUNK_RADIUS_MM), arrival: direction, direction };
@@ -59,6 +59,5 @@ pub(crate) fn shape(params: &Params, seed: u64) -> Shape {
         clearance_mm: params.clearance_mm,
     };
     growth.grow(vec![trunk], &rules);
-    shape.scale(params.size);
     shape
 }
