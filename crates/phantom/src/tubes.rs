@@ -110,7 +110,7 @@ fn fork(params: &Params) -> Result<(Shape, Truth), Error> {
     Ok((shape, Truth { branch_angle_deg, ..truth(params, 3.0 * length, 2) }))
 }
 
-/// A ring of radius R about the axis; its tree is opened opposite to the root's far neighbour.
+/// A ring of radius R about the axis; its tree leaves out the last step, back to the root.
 fn torus(params: &Params) -> Result<(Shape, Truth), Error> {
     let (frame, ring) = (Frame::of(params), params.ring_radius_mm);
     let around = |s: f64| {
