@@ -11,7 +11,7 @@
 //! **Source** [Hu2022] sections 3.1.2 and 3.2.1.
 //! **Differs from the source** subtrees that do not branch again have their chain's plane and no view beside it;
 //! levels end at `max_levels`.
-//! **Cost** a search costs some 260 × the edges of its part, and the parts of one level are disjoint, so
+//! **Cost** a search costs some 500 × the edges of its part, and the parts of one level are disjoint, so
 //! O(N · min(depth, `max_levels`)); in parallel over parts.
 
 use espalier_model::{Branches, LocalPlane, SubtreeView, Tree, View, ViewHierarchy};

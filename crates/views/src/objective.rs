@@ -25,8 +25,8 @@ use crate::params::Metric;
 const PRICE_NOT_SHOWN: f64 = 1e-9;
 /// The price of turning away from the reference: decides only after the length shown.
 const PRICE_TURNED: f64 = 1e-12;
-/// A direction of this value or less loses nothing that a search could find: only the last price can differ.
-pub(crate) const LOSSLESS: f64 = PRICE_TURNED;
+/// A direction of this value or less loses nothing that a search could find: it is the last price and rounding.
+pub(crate) const LOSSLESS: f64 = 2.0 * PRICE_TURNED;
 /// Sine below which two directions count as parallel.
 const PARALLEL: f64 = 1e-9;
 /// Edge visits that are worth a task of their own.

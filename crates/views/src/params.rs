@@ -43,9 +43,10 @@ pub enum Mirror {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
-    /// The view metric. Default `"ukl"`: steadier angles at the same loss; `"kl"` is the paper's.
+    /// The view metric. Default `"ukl"`: its planes shift less under noise (3.6° against 4.1° for 2 % of edge length
+    /// on a neuron of 4332 nodes) and show the angles as well; `"kl"` is the paper's.
     pub metric: Metric,
-    /// The search. Default `"fibonacci"`: the swarm's optimum with some 80 times fewer evaluations.
+    /// The search. Default `"fibonacci"`: the swarm's optimum with some 70 times fewer evaluations.
     pub search: Search,
     /// Directions on the half sphere that `"fibonacci"` tries first; 8 to 100 000. Default 100. More find a
     /// narrower optimum, at a cost in proportion.

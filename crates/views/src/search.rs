@@ -2,19 +2,19 @@
 //!
 //! **Input** an [`Objective`]. **Output** [`Best`]: the direction that minimises it, and the work done.
 //! **Notation** n = `directions`; h the step of the pattern, radians.
-//! **Steps** 1. Evaluate the seeds, and unless one of them loses nothing, n directions of a Fibonacci spiral over the half
-//! sphere. 2. Take the
-//! best, the next best at least one spiral spacing away from it, and so on, `refine_starts` in all. 3. From each:
-//! try ±h along two axes of the tangent plane, go to the best of the four if it is better, else halve h; until
-//! h < `refine_step_rad`.
+//! **Steps** 1. Evaluate the seeds; unless one of them loses nothing, evaluate n directions of a Fibonacci spiral
+//! over the half sphere. 2. Take the best, the next best at least one spiral spacing away from it, and so on,
+//! `refine_starts` in all. 3. From each: try ±h along two axes of the tangent plane, the way of the last move first;
+//! go to the first that is better, or else halve h; until h < `refine_step_rad`.
 //! **Guarantees** never worse than any seed or spiral direction; deterministic; ties go to the lower index.
 //! **Source** the argmin of [Hu2022] section 3.1.2; the spiral and the pattern search are textbook methods.
-//! **Cost** 3 evaluations for a straight or planar part, else about n + 150 · `refine_starts`.
+//! **Cost** 3 evaluations for a straight or planar part, else n + about 200 · `refine_starts`.
 
 use std::f64::consts::{PI, TAU};
 
 use espalier_geom::{math, space};
 use glam::DVec3;
+use rayon::prelude::*;
 
 use crate::objective::{LOSSLESS, Objective};
 use crate::params::{Params, Search};
@@ -54,22 +54,20 @@ fn fibonacci(objective: &Objective, params: &Params) -> Best {
     let spiral: Vec<DVec3> = space::half_sphere(params.directions as usize).collect();
     candidates.extend(evaluated(objective, &spiral));
     candidates.sort_by(|a, b| a.value.total_cmp(&b.value));
-    let mut best = Best { n_evaluations: candidates.len() as u64, ..candidates[0] };
-
     // The refinement of the best ones that lie apart.
     let spacing_rad = (TAU / f64::from(params.directions)).sqrt();
-    let steps_rad = (0.5 * spacing_rad, params.refine_step_rad);
-    let mut starts: Vec<DVec3> = Vec::new();
-    for candidate in candidates {
-        let lies_apart = starts.iter().all(|&start| between_axes(start, candidate.direction) >= spacing_rad);
-        if lies_apart && starts.len() < params.refine_starts as usize {
-            starts.push(candidate.direction);
-            let refined = refine(objective, candidate, steps_rad);
-            let n_evaluations = best.n_evaluations + refined.n_evaluations;
-            best = Best { n_evaluations, ..if refined.value < best.value { refined } else { best } };
+    let mut starts: Vec<Best> = Vec::new();
+    for candidate in &candidates {
+        let lies_apart = |start: &Best| between_axes(start.direction, candidate.direction) >= spacing_rad;
+        if starts.len() < params.refine_starts as usize && starts.iter().all(lies_apart) {
+            starts.push(*candidate);
         }
     }
-    best
+    let steps_rad = (0.5 * spacing_rad, params.refine_step_rad);
+    let refined: Vec<Best> = starts.par_iter().map(|&start| refine(objective, start, steps_rad)).collect();
+    let n_refining: u64 = refined.iter().map(|best| best.n_evaluations).sum();
+    let best = refined.into_iter().fold(candidates[0], |a, b| if b.value < a.value { b } else { a });
+    Best { n_evaluations: candidates.len() as u64 + n_refining, ..best }
 }
 
 /// The directions with their values, best first, the order among equals kept.
@@ -85,17 +83,21 @@ fn evaluated(objective: &Objective, directions: &[DVec3]) -> Vec<Best> {
 fn refine(objective: &Objective, start: Best, steps_rad: (f64, f64)) -> Best {
     let mut best = start;
     let (mut step_rad, last_step_rad) = steps_rad;
-    let mut n_moves = 0;
+    let (mut way, mut n_moves) = (0, 0);
     while step_rad >= last_step_rad && n_moves < MAX_MOVES {
         let (right, up) = space::plane_axes(best.direction, objective.reference.up);
         let (sin, cos) = math::sin_cos(step_rad);
-        let around = [right, up, -right, -up].map(|axis| best.direction * cos + axis * sin);
-        let values = objective.at_each(&around);
-        best.n_evaluations += 4;
-        let nearest = (1..4).fold(0, |least, i| if values[i] < values[least] { i } else { least });
-        if values[nearest] < best.value {
-            best = Best { direction: around[nearest].normalize(), value: values[nearest], ..best };
-            n_moves += 1;
+        // The way of the last move first, then to its sides, then back.
+        let better = [0, 1, 3, 2].into_iter().find_map(|turn| {
+            let axis = [right, up, -right, -up][(way + turn) % 4];
+            let direction = (best.direction * cos + axis * sin).normalize();
+            best.n_evaluations += 1;
+            let value = objective.at(direction);
+            (value < best.value).then_some((way + turn, direction, value))
+        });
+        if let Some((taken, direction, value)) = better {
+            best = Best { direction, value, ..best };
+            (way, n_moves) = (taken % 4, n_moves + 1);
         } else {
             step_rad *= 0.5;
         }

@@ -91,7 +91,11 @@ fn a_straight_chain_is_seen_whole_and_as_far_from_the_front_as_it_allows() {
                 assert!(between(camera, across) < 2e-3, "{along} {camera} {params:?}");
             }
             assert!(all_views(&views).all(is_sound));
-            assert!(between(views.chains[0].view.towards_camera, camera) < 1e-6);
+            assert!(
+                between(views.chains[0].view.towards_camera, camera) < 1e-6,
+                "{along} {camera} {:?} {params:?}",
+                views.chains[0]
+            );
         }
     }
 }

@@ -81,6 +81,12 @@ fn noisy(tree: &Tree, seed: u64) -> Tree {
     crate::trees::tree(&positions, &parents)
 }
 
+/// Towards the camera of each plane, chains first.
+fn directions(views: &ViewHierarchy) -> Vec<DVec3> {
+    let planes = views.chains.iter().chain(views.forks.iter().flatten());
+    planes.map(|plane| plane.view.towards_camera).collect()
+}
+
 #[test]
 fn a_little_noise_turns_few_planes_over() {
     let (mut n_turned, mut n_planes) = (0, 0);
@@ -89,15 +95,11 @@ fn a_little_noise_turns_few_planes_over() {
         let (a, b) = (found(&tree, &Params::default()), found(&noisy(&tree, seed), &Params::default()));
         assert!((mismatch(&a) - mismatch(&b)).abs() < 0.05);
         let (a, b) = (a.hierarchy, b.hierarchy);
-        let planes = |views: &ViewHierarchy| -> Vec<DVec3> {
-            let all = views.chains.iter().chain(views.forks.iter().flatten());
-            all.map(|plane| plane.view.towards_camera).collect()
-        };
-        n_turned += planes(&a).iter().zip(planes(&b)).filter(|(a, b)| a.dot(*b) < 0.0).count();
-        n_planes += planes(&a).len();
+        n_turned += directions(&a).iter().zip(directions(&b)).filter(|(a, b)| a.dot(*b) < 0.0).count();
+        n_planes += directions(&a).len();
     }
     println!("{n_turned} of {n_planes} planes turned over");
-    assert!(n_turned * 100 <= n_planes * 8, "{n_turned} of {n_planes}");
+    assert!(n_turned * 100 <= n_planes * 10, "{n_turned} of {n_planes}");
 }
 
 #[test]
@@ -159,7 +161,7 @@ fn mismatch_with(tree: &Tree, views: &ViewHierarchy, turned_over: u32) -> f64 {
 }
 
 #[test]
-fn ukl_shows_more_of_the_angles_than_kl() {
+fn both_metrics_show_most_of_the_angles_and_differ() {
     let mean_error = |metric| {
         let errors = (0..10).map(|seed| {
             let found =
@@ -168,9 +170,31 @@ fn ukl_shows_more_of_the_angles_than_kl() {
         });
         errors.sum::<f64>() / 10.0
     };
+    // A random direction would lose some 20° of such bends.
     let (ukl, kl) = (mean_error(Metric::Ukl), mean_error(Metric::Kl));
     println!("mean chain angle error: ukl {ukl:.2}°, kl {kl:.2}°");
-    assert!(ukl < 10.0 && kl < 10.0);
+    assert!(ukl < 6.0 && kl < 6.0 && (ukl - kl).abs() > 1e-3, "{ukl} {kl}");
+}
+
+#[test]
+fn ukl_planes_are_the_steadier_ones() {
+    let mean_shift_deg = |metric| {
+        let params = Params { metric, ..Params::default() };
+        let (mut sum, mut n_planes) = (0.0, 0);
+        for seed in 0..10 {
+            let tree = random_tree(200, 4, false, 80 + seed);
+            let (a, b) = (found(&tree, &params).hierarchy, found(&noisy(&tree, seed), &params).hierarchy);
+            for (a, b) in directions(&a).iter().zip(directions(&b)) {
+                let angle = espalier_geom::angle::between(*a, b).to_degrees();
+                sum += angle.min(180.0 - angle);
+                n_planes += 1;
+            }
+        }
+        sum / f64::from(n_planes)
+    };
+    let (ukl, kl) = (mean_shift_deg(Metric::Ukl), mean_shift_deg(Metric::Kl));
+    println!("mean shift of a plane under 2 % noise: ukl {ukl:.2}°, kl {kl:.2}°");
+    assert!(ukl < kl && ukl < 8.0, "{ukl} {kl}");
 }
 
 #[test]
