@@ -163,7 +163,7 @@ fn meeting_point(fork: Sample, arms: &[Arm], scatter_mm: f64, mask: &Mask) -> Sa
         }
     }
     let thickest_mm = fits.iter().map(|fit| fit.radius_mm).fold(0.0, f64::max);
-    Sample { position_mm: fork.position_mm + shift, radius_mm: thickest_mm.min(fork.radius_mm) }
+    Sample { position_mm: fork.position_mm + shift, radius_mm: thickest_mm }
 }
 
 /// Leads a line to the new place of its fork.

@@ -38,6 +38,8 @@ const MAX_DROPPED: f64 = 0.5;
 /// Rays beside the axis: their distances from it, in radii of the end sphere, and how many at each.
 const RINGS: [f64; 2] = [0.3, 0.6];
 const SPOKES: usize = 8;
+/// The range of caps: on voxels a half sphere measures 0.5 to 0.7.
+const CAP: [f64; 2] = [0.4, 0.8];
 /// The rays beside the axis correct the one on it by at most this many radii.
 const MAX_CORRECTION: f64 = 0.5;
 /// So far inside the end sphere, in calibres, spheres may still be cut short by the end.
@@ -109,10 +111,10 @@ fn moved(inwards: &[Sample], mask: &Mask, tips: Tips) -> Option<Moved> {
     let on_axis = fit.point_mm + (inwards[end].position_mm - fit.point_mm).project_onto_normalized(outwards);
     let radius_mm = radius_at(&inwards[end..=inner], &arcs[end..=inner], on_axis, calibre_mm);
 
-    let free_mm = free_end_mm(mask, on_axis, outwards, radius_mm)?;
-    let ends_at_border = leaves_scan(mask, on_axis, outwards, free_mm);
+    let on_axis_mm = free_length_mm(mask, on_axis, outwards, LOOK_AHEAD * radius_mm)?;
+    let free_mm = free_end_mm(mask, (on_axis, on_axis_mm), outwards, radius_mm);
     let beyond_mm = match tips {
-        _ if ends_at_border => free_mm,
+        _ if leaves_scan(mask, on_axis, outwards, on_axis_mm) => on_axis_mm,
         Tips::Sphere => free_mm - radius_mm,
         Tips::Surface => free_mm.min(radius_mm),
         Tips::Keep => 0.0,
@@ -128,13 +130,13 @@ fn moved(inwards: &[Sample], mask: &Mask, tips: Tips) -> Option<Moved> {
     Some(Moved { samples, outwards_mm })
 }
 
-/// How far the mask goes on from a point along its axis, in mm; `None` if the point lies outside of it.
+/// How far the mask goes on from a point along its axis, in mm, given how far it does on the axis itself.
 ///
-/// One ray alone is wrong by up to a voxel. So there are rays beside it, and their ends are fitted by h = h₀ − c ρ² over
-/// the distance ρ from the axis, which holds for flat ends and for round ones.
-fn free_end_mm(mask: &Mask, on_axis: DVec3, outwards: DVec3, radius_mm: f64) -> Option<f64> {
+/// That one ray alone is wrong by up to a voxel. So there are rays beside it, and their ends are fitted by h = h₀ − c R x,
+/// x = (ρ/R)² for the distance ρ from the axis: c is 0 for a flat end and near ½ for a round one. Thick slices cannot
+/// tell which, so c stays in `CAP`.
+fn free_end_mm(mask: &Mask, (on_axis, on_axis_mm): (DVec3, f64), outwards: DVec3, radius_mm: f64) -> f64 {
     let limit_mm = LOOK_AHEAD * radius_mm;
-    let on_axis_mm = free_length_mm(mask, on_axis, outwards, limit_mm)?;
     let (right, up) = plane_axes(outwards, DVec3::Z);
     let mut ends = vec![(0.0, on_axis_mm)];
     for share in RINGS {
@@ -152,10 +154,11 @@ fn free_end_mm(mask: &Mask, on_axis: DVec3, outwards: DVec3, radius_mm: f64) -> 
     let variance: f64 = ends.iter().map(|e| (e.0 - mean_x) * (e.0 - mean_x)).sum();
     let covariance: f64 = ends.iter().map(|e| (e.0 - mean_x) * (e.1 - mean_y)).sum();
     let is_whole = ends.len() == 1 + RINGS.len() * SPOKES;
-    let fitted_mm = mean_y - mean_x * covariance / variance.max(f64::MIN_POSITIVE);
+    let slope_mm = -covariance / variance.max(f64::MIN_POSITIVE);
+    let fitted_mm = mean_y + mean_x * slope_mm.clamp(CAP[0] * radius_mm, CAP[1] * radius_mm);
     // Where the tip is narrower than its end sphere, or bent, the axis alone has to do.
     let is_near = (fitted_mm - on_axis_mm).abs() <= MAX_CORRECTION * radius_mm;
-    Some(if is_whole && is_near { fitted_mm } else { on_axis_mm })
+    if is_whole && is_near { fitted_mm } else { on_axis_mm }
 }
 
 /// The radius of the tube at its end, in mm, from the stretch inside of it: the spheres at the very end are smaller.
