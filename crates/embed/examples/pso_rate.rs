@@ -3,7 +3,7 @@
 //! `cargo run --release -p espalier-embed --example pso_rate -- TREE.swc|neuron|airway|vessel [paper] [s|b|n]
 //! [PARTICLESxITERATIONS] [SEED]`
 //!
-//! Prints one line per iteration, the rate, and the table of methods.
+//! The seed is that of the phantom and of the swarm. Prints one line per iteration, the rate, and the table of methods.
 #![allow(clippy::print_stdout, clippy::disallowed_methods, reason = "an example that measures")]
 
 use std::error::Error;
@@ -17,7 +17,7 @@ use espalier_views::find_views;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut words = std::env::args().skip(1);
-    let tree = tree(&words.next().unwrap_or_else(|| "neuron".to_owned()))?;
+    let source = words.next().unwrap_or_else(|| "neuron".to_owned());
     let (mut params, mut seed) = (Params::default(), 0);
     for word in words {
         match word.as_str() {
@@ -33,6 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             },
         }
     }
+    let tree = tree(&source, seed)?;
     let views = find_views(&tree, &espalier_views::Params::default(), seed)?.hierarchy;
     println!("{} nodes, {} branches, {params:?}", tree.n_nodes(), tree.branches().list().len());
 
@@ -55,14 +56,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn tree(name: &str) -> Result<Tree, Box<dyn Error>> {
+fn tree(name: &str, seed: u64) -> Result<Tree, Box<dyn Error>> {
     let kind = match name {
         "neuron" => Kind::Neuron,
         "airway" => Kind::Airway,
         "vessel" => Kind::Vessel,
         path => return swc_tree(&std::fs::read(path)?),
     };
-    Ok(espalier_phantom::grow_tree(kind, &espalier_phantom::Params::default(), 0)?)
+    Ok(espalier_phantom::grow_tree(kind, &espalier_phantom::Params::default(), seed)?)
 }
 
 /// The first root's tree of a file, without nodes that lie on their parents.

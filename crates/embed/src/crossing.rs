@@ -2,8 +2,9 @@
 //!
 //! **Input** positions as two flat arrays. **Output** the number of pairs of edges that meet, or that it is above
 //! a limit. **Notation** a run is 8 edges next to each other in preorder, hence mostly a piece of a chain.
-//! **Steps** 1. Box of each edge and each run. 2. Sort runs by their left border and sweep. 3. Where two run boxes
-//! meet, box against box, then segment against segment.
+//! **Steps** 1. Box of each edge, in single precision and rounded outwards, so that a run's boxes fill vector
+//! registers; box of each run. 2. Sort runs by their left border and sweep. 3. Where two run boxes meet: which
+//! edges of one reach the other, which of those boxes meet, then segment against segment in double precision.
 //! **Guarantees** strict: edges that come nearer than 1e-6 of the median edge length count as meeting, and
 //! siblings within 1e-6 rad, so that what has no crossing here has none after rounding, in the exact check.
 //! A parent and its child never meet: r_a ≥ −0.97 keeps them apart. Same count for any limit that is not reached.
@@ -12,42 +13,84 @@
 
 use crate::problem::Problem;
 
-/// Edges in a run: chains are contiguous, so a run's box is small, and 8 boxes fill one or two vector registers.
+/// Edges in a run: eight single-precision borders are one or two vector registers.
 const RUN: usize = 8;
 /// The tolerance as a share of the median edge length, and the least angle between siblings in rad.
 const TOLERANCE: f64 = 1e-6;
+/// Two units in the last place of single precision, by which a border is moved outwards.
+const OUTWARDS: f32 = 2.4e-7;
 
 /// What a particle's check needs; one per thread.
 #[derive(Default)]
 pub(crate) struct Scratch {
-    /// Boxes of edges, grown by the tolerance; entry v − 1 is the edge above node v.
-    edges: Boxes,
-    /// Boxes of runs.
-    runs: Boxes,
-    /// Runs by left border.
-    order: Vec<u32>,
+    /// The boxes of each run's edges; lane i of run k is the edge above node 8 k + i + 1.
+    lanes: Vec<Lanes>,
+    /// The boxes of runs, by left border.
+    runs: Vec<RunBox>,
 }
 
-#[derive(Default)]
-struct Boxes {
-    x_low: Vec<f64>,
-    x_high: Vec<f64>,
-    y_low: Vec<f64>,
-    y_high: Vec<f64>,
+/// A box in units of the median edge length, grown by half the tolerance.
+#[derive(Clone, Copy)]
+struct Box2 {
+    x_low: f32,
+    x_high: f32,
+    y_low: f32,
+    y_high: f32,
 }
 
-impl Boxes {
-    fn resize(&mut self, len: usize) {
-        for side in [&mut self.x_low, &mut self.x_high, &mut self.y_low, &mut self.y_high] {
-            side.resize(len, 0.0);
+#[derive(Clone, Copy)]
+struct RunBox {
+    bounds: Box2,
+    run: u32,
+}
+
+/// The boxes of up to eight edges; lanes without an edge meet nothing.
+#[derive(Clone, Copy)]
+struct Lanes {
+    x_low: [f32; RUN],
+    x_high: [f32; RUN],
+    y_low: [f32; RUN],
+    y_high: [f32; RUN],
+}
+
+impl Lanes {
+    const EMPTY: Self = Self {
+        x_low: [f32::INFINITY; RUN],
+        x_high: [f32::NEG_INFINITY; RUN],
+        y_low: [f32::INFINITY; RUN],
+        y_high: [f32::NEG_INFINITY; RUN],
+    };
+
+    #[inline]
+    fn set(&mut self, lane: usize, bounds: Box2) {
+        self.x_low[lane] = bounds.x_low;
+        self.x_high[lane] = bounds.x_high;
+        self.y_low[lane] = bounds.y_low;
+        self.y_high[lane] = bounds.y_high;
+    }
+
+    #[inline]
+    fn get(&self, lane: usize) -> Box2 {
+        Box2 {
+            x_low: self.x_low[lane],
+            x_high: self.x_high[lane],
+            y_low: self.y_low[lane],
+            y_high: self.y_high[lane],
         }
     }
 
-    fn meet(&self, a: usize, other: &Self, b: usize) -> bool {
-        self.x_low[a] <= other.x_high[b]
-            && other.x_low[b] <= self.x_high[a]
-            && self.y_low[a] <= other.y_high[b]
-            && other.y_low[b] <= self.y_high[a]
+    /// One bit for each lane whose box meets `bounds`.
+    #[inline]
+    fn meeting(&self, bounds: Box2) -> u32 {
+        let mut is_met = [0_u32; RUN];
+        // No branches and a fixed length: this loop becomes a few vector comparisons.
+        for lane in 0..RUN {
+            is_met[lane] = u32::from(self.x_low[lane] <= bounds.x_high)
+                & u32::from(bounds.x_low <= self.x_high[lane])
+                & u32::from(self.y_low[lane] <= bounds.y_high)
+                & u32::from(bounds.y_low <= self.y_high[lane]);
+        }
+        is_met.iter().enumerate().fold(0, |bits, (lane, met)| bits | met << lane)
     }
 }
 
@@ -58,24 +101,18 @@ pub(crate) fn count(problem: &Problem, x: &[f64], y: &[f64], limit: usize, scrat
     }
     let check = Check { problem, x, y, tolerance: TOLERANCE * problem.scale_mm };
     check.fill_boxes(scratch);
-    let Scratch { edges, runs, order } = scratch;
-    order
-        .sort_unstable_by(|&a, &b| runs.x_low[a as usize].total_cmp(&runs.x_low[b as usize]).then(a.cmp(&b)));
+    let Scratch { lanes, runs } = scratch;
+    runs.sort_unstable_by(|a, b| a.bounds.x_low.total_cmp(&b.bounds.x_low).then(a.run.cmp(&b.run)));
 
     let mut n_met = 0;
-    for (place, &run) in order.iter().enumerate() {
-        let run = run as usize;
-        n_met += check.within_run(edges, run);
-        for &other in &order[place + 1..] {
-            let other = other as usize;
-            if runs.x_low[other] > runs.x_high[run] {
-                break;
-            }
-            if runs.meet(run, runs, other) {
-                n_met += check.between_runs(edges, runs, run.min(other), run.max(other));
-            }
-            if n_met > limit {
-                return n_met;
+    for (place, &RunBox { bounds, run }) in runs.iter().enumerate() {
+        n_met += check.within_run(lanes, run as usize);
+        for other in runs[place + 1..].iter().take_while(|other| other.bounds.x_low <= bounds.x_high) {
+            if other.bounds.y_low <= bounds.y_high && bounds.y_low <= other.bounds.y_high {
+                n_met += check.between_runs(lanes, run as usize, other);
+                if n_met > limit {
+                    return n_met;
+                }
             }
         }
         if n_met > limit {
@@ -96,51 +133,64 @@ impl Check<'_> {
     fn fill_boxes(&self, scratch: &mut Scratch) {
         let n_edges = self.x.len() - 1;
         let n_runs = n_edges.div_ceil(RUN);
-        scratch.edges.resize(n_edges);
-        scratch.runs.resize(n_runs);
-        let grow = 0.5 * self.tolerance;
-        for edge in 0..n_edges {
-            let (node, parent) = (edge + 1, self.problem.parent[edge + 1] as usize);
-            scratch.edges.x_low[edge] = self.x[node].min(self.x[parent]) - grow;
-            scratch.edges.x_high[edge] = self.x[node].max(self.x[parent]) + grow;
-            scratch.edges.y_low[edge] = self.y[node].min(self.y[parent]) - grow;
-            scratch.edges.y_high[edge] = self.y[node].max(self.y[parent]) + grow;
+        let per_mm = 1.0 / self.problem.scale_mm;
+        scratch.lanes.clear();
+        scratch.lanes.resize(n_runs, Lanes::EMPTY);
+        scratch.runs.clear();
+        for (run, lanes) in scratch.lanes.iter_mut().enumerate() {
+            let mut all = Box2 {
+                x_low: f32::INFINITY,
+                x_high: f32::NEG_INFINITY,
+                y_low: f32::INFINITY,
+                y_high: f32::NEG_INFINITY,
+            };
+            for lane in 0..RUN.min(n_edges - run * RUN) {
+                let node = run * RUN + lane + 1;
+                let parent = self.problem.parent[node] as usize;
+                let (x_low, x_high) = grown(self.x[node] * per_mm, self.x[parent] * per_mm);
+                let (y_low, y_high) = grown(self.y[node] * per_mm, self.y[parent] * per_mm);
+                lanes.set(lane, Box2 { x_low, x_high, y_low, y_high });
+                all.x_low = all.x_low.min(x_low);
+                all.x_high = all.x_high.max(x_high);
+                all.y_low = all.y_low.min(y_low);
+                all.y_high = all.y_high.max(y_high);
+            }
+            scratch.runs.push(RunBox { bounds: all, run: run as u32 });
         }
-        let least = |sides: &[f64]| sides.iter().fold(f64::INFINITY, |least, &side| least.min(side));
-        let most = |sides: &[f64]| sides.iter().fold(f64::NEG_INFINITY, |most, &side| most.max(side));
-        for run in 0..n_runs {
-            let range = run * RUN..n_edges.min((run + 1) * RUN);
-            scratch.runs.x_low[run] = least(&scratch.edges.x_low[range.clone()]);
-            scratch.runs.x_high[run] = most(&scratch.edges.x_high[range.clone()]);
-            scratch.runs.y_low[run] = least(&scratch.edges.y_low[range.clone()]);
-            scratch.runs.y_high[run] = most(&scratch.edges.y_high[range]);
-        }
-        scratch.order.clear();
-        scratch.order.extend(0..n_runs as u32);
     }
 
-    fn within_run(&self, edges: &Boxes, run: usize) -> usize {
-        let range = run * RUN..(self.x.len() - 1).min((run + 1) * RUN);
+    fn within_run(&self, lanes: &[Lanes], run: usize) -> usize {
+        let boxes = &lanes[run];
         let mut n_met = 0;
-        for first in range.clone() {
-            for second in first + 1..range.end {
-                n_met += usize::from(edges.meet(first, edges, second) && self.pair_meets(first, second));
-            }
+        for lane in 0..RUN - 1 {
+            // Only lanes after this one.
+            let met = boxes.meeting(boxes.get(lane)) & (!1 << lane);
+            n_met += self.pairs_meeting(run * RUN + lane, run * RUN, met);
         }
         n_met
     }
 
-    fn between_runs(&self, edges: &Boxes, runs: &Boxes, run: usize, other: usize) -> usize {
-        let n_edges = self.x.len() - 1;
-        let others = other * RUN..n_edges.min((other + 1) * RUN);
+    fn between_runs(&self, lanes: &[Lanes], run: usize, other: &RunBox) -> usize {
+        let (boxes, other_boxes) = (&lanes[run], &lanes[other.run as usize]);
+        let mut reaching = boxes.meeting(other.bounds);
         let mut n_met = 0;
-        for first in run * RUN..(run + 1) * RUN {
-            if !edges.meet(first, runs, other) {
-                continue;
-            }
-            for second in others.clone() {
-                n_met += usize::from(edges.meet(first, edges, second) && self.pair_meets(first, second));
-            }
+        while reaching != 0 {
+            let lane = reaching.trailing_zeros() as usize;
+            reaching &= reaching - 1;
+            let met = other_boxes.meeting(boxes.get(lane));
+            n_met += self.pairs_meeting(run * RUN + lane, other.run as usize * RUN, met);
+        }
+        n_met
+    }
+
+    /// How many of the edges `start + lane`, for the lanes whose bit is set, meet an edge.
+    #[inline]
+    fn pairs_meeting(&self, edge: usize, start: usize, mut lanes: u32) -> usize {
+        let mut n_met = 0;
+        while lanes != 0 {
+            let other = start + lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            n_met += usize::from(self.pair_meets(edge.min(other), edge.max(other)));
         }
         n_met
     }
@@ -160,6 +210,13 @@ impl Check<'_> {
             segments_meet(edge_a, edge_b, self.tolerance)
         }
     }
+}
+
+/// The interval between two numbers, grown by half the tolerance and rounded outwards.
+#[inline]
+fn grown(a: f64, b: f64) -> (f32, f32) {
+    let (low, high) = ((a.min(b) - 0.5 * TOLERANCE) as f32, (a.max(b) + 0.5 * TOLERANCE) as f32);
+    (low - low.abs() * OUTWARDS, high + high.abs() * OUTWARDS)
 }
 
 /// Whether two edges from one hub point the same way to within the tolerance.

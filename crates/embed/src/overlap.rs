@@ -6,7 +6,8 @@
 //! place where they part: the path along the tree between their near ends is longer than r_e + r_f, and longer
 //! than twice the junction disc at the node where they part.
 //! **Junction disc** for tubes r_i, r_j that part at the gap g: radius √(r_i² + r_j² + 2 r_i r_j cos g) / sin g
-//! for g ≤ 90°, r_i + r_j above, but never more than the shorter of the two edges there.
+//! for g ≤ 90°, r_i + r_j above, but never more than the shorter of the two branches: edges are often shorter
+//! than the organ is thick.
 //! **Steps** 1. Sweep over boxes grown by the radius. 2. Distance of centrelines. 3. Lowest common ancestor by a
 //! sparse table over the preorder. 4. Path and disc.
 //! **Guarantees** the same count in any order. **Cost** O(N log N + boxes that meet).
@@ -83,6 +84,15 @@ impl<'a> Tubes<'a> {
         between > reach && between > 2.0 * self.junction_disc(parting, a, b)
     }
 
+    /// The length in the plane of the branch to which a node belongs; that of the root, which has none, is 0.
+    fn branch_length(&self, node: usize) -> f64 {
+        let branches = &self.problem.branches;
+        branches.of_node(node).map_or(0.0, |branch| {
+            let branch = &branches.list()[branch];
+            self.path[branch.end()] - self.path[branch.hub]
+        })
+    }
+
     /// The radius of the disc about `parting` inside which the tubes towards `a` and `b` overlap anyway.
     fn junction_disc(&self, parting: usize, a: usize, b: usize) -> f64 {
         let towards = |node: usize| {
@@ -108,7 +118,7 @@ impl<'a> Tubes<'a> {
         } else {
             r_a + r_b
         };
-        disc.min(to_a.length()).min(to_b.length())
+        disc.min(self.branch_length(arm_a)).min(self.branch_length(arm_b))
     }
 }
 

@@ -1,5 +1,7 @@
 //! The whole stage on random trees: what it promises, for every tree.
 
+#![allow(clippy::expect_used, reason = "a test that cannot go on says why")]
+
 mod common;
 
 use common::{random_tree, tree_of, views_along};

@@ -1,5 +1,6 @@
 //! Random trees of eight families and plain views, for all tests of the crate.
 #![allow(dead_code, reason = "each test file uses a part of it")]
+#![allow(clippy::expect_used, reason = "a test that cannot go on says why")]
 
 use espalier_geom::math;
 use espalier_geom::random::{Purpose, Stream};
