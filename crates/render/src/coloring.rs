@@ -23,7 +23,7 @@ const HALF_RANGE: [f64; 2] = [0.25, 2.0];
 /// More generations than this run into each other and are drawn as a continuous bar.
 const MAX_STEPS: usize = 10;
 /// Ticks closer than this to a more important one are left out, as a share of the bar.
-const TICK_GAP: f64 = 0.07;
+const TICK_GAP: f64 = 0.09;
 
 /// A mark on the colour bar.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,11 +62,13 @@ pub(crate) fn color(tree: &Tree, branches: &Branches, embedding: &Embedding, par
     match params.color_by {
         ColorBy::Radius => by_radius(tree, &local_radii(tree), params),
         ColorBy::BranchRadius => by_radius(tree, &branch_radii(tree, branches), params),
-        ColorBy::Generation => by_generation(tree, branches),
+        ColorBy::Generation => by_generation(tree, branches, params),
         ColorBy::Branch => by_branch(tree, branches),
-        ColorBy::AngleLoss => by_loss("angle loss (°)", tree, |node| angle_loss_deg(tree, embedding, node)),
+        ColorBy::AngleLoss => {
+            by_loss("angle loss (°)", (tree, params), |node| angle_loss_deg(tree, embedding, node))
+        }
         ColorBy::LengthLoss => {
-            by_loss("length loss (%)", tree, |node| 100.0 * length_loss(tree, embedding, node))
+            by_loss("length loss (%)", (tree, params), |node| 100.0 * length_loss(tree, embedding, node))
         }
     }
 }
@@ -186,12 +188,13 @@ fn add_tick(ticks: &mut Vec<Tick>, position: f64, text: String) {
     }
 }
 
-fn by_generation(tree: &Tree, branches: &Branches) -> Coloring {
+fn by_generation(tree: &Tree, branches: &Branches, params: &Params) -> Coloring {
     let generation = |node| branches.of_node(node).map_or(0, |branch| branches.list()[branch].generation);
     let last = (0..tree.n_nodes()).map(generation).max().unwrap_or(0);
     let n_steps = last as usize + 1;
     let is_stepped = n_steps <= MAX_STEPS;
-    let palette = if is_stepped { Palette::ordered().in_steps(n_steps) } else { Palette::ordered() };
+    let ordered = Palette::ordered(params.theme);
+    let palette = if is_stepped { ordered.in_steps(n_steps) } else { ordered };
     let place = |generation: usize| {
         if is_stepped { palette.value_of(generation) } else { generation as f32 / last as f32 }
     };
@@ -227,13 +230,13 @@ fn by_branch(tree: &Tree, branches: &Branches) -> Coloring {
     Coloring { palette, ends, scale: None }
 }
 
-fn by_loss(caption: &str, tree: &Tree, loss_of: impl Fn(usize) -> f64) -> Coloring {
+fn by_loss(caption: &str, (tree, params): (&Tree, &Params), loss_of: impl Fn(usize) -> f64) -> Coloring {
     let losses: Vec<f64> = (0..tree.n_nodes()).map(loss_of).collect();
     // At least 1 (degree, percent), so that rounding does not fill the scale.
     let most = losses.iter().copied().filter(|loss| loss.is_finite()).fold(1.0, f64::max);
     let ticks = unit::multiples(0.0, most, 5).into_iter().map(|tick| (tick / most, tick)).collect();
     let ends = losses.iter().map(|loss| [(loss / most) as f32; 2]).collect();
-    Coloring { palette: Palette::losses(), ends, scale: Some(linear_scale(caption, ticks)) }
+    Coloring { palette: Palette::losses(params.theme), ends, scale: Some(linear_scale(caption, ticks)) }
 }
 
 fn linear_scale(caption: &str, ticks: Vec<(f64, f64)>) -> Scale {

@@ -9,6 +9,8 @@
 //! B = r_a k + m x, C = r_a² − |w|². √g is concave where B² + A C > 0, so z(s) has one peak,
 //! s* = (B + u_z q)/A, q = √((B² + A C)/(1 − k²)), clamped to [0, L]. A flat cone has u_z = 0, s* = B/A, and is
 //! then exactly z = √(r² − d²) over its centreline when it does not taper.
+//! Normals turn with the chain: at a joint both cones lean half way to each other, in between linearly, so that a
+//! bent or unevenly tapering tube is lit without rings at its nodes.
 //! **Guarantees** only basic arithmetic and square roots: the same bits on every machine.
 //! **Cost** O(1) for a pixel.
 
@@ -41,6 +43,26 @@ pub(crate) struct Cone {
     k: f32,
     /// The range of x that this cone must fill; beyond it another cone of the chain does.
     range: [f32; 2],
+    /// What light sees at either end.
+    lit: [LitEnd; 2],
+}
+
+/// The direction of the surface at an end of a cone, as light sees it.
+#[derive(Clone, Copy, Debug)]
+struct LitEnd {
+    axis: Vec3,
+    taper: f32,
+    /// Whether the end is a whole ball, round to the last.
+    is_end: bool,
+}
+
+/// How a chain goes on beyond an end of a cone.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Joint {
+    /// A tip, a fork or the root: the end is a whole ball.
+    End,
+    /// One more edge follows, to or from the ball given.
+    Chain(Ball),
 }
 
 /// A place on a cone.
@@ -60,30 +82,25 @@ pub(crate) struct Hit {
     pub outside: f32,
 }
 
-impl Hit {
-    /// The unit normal, towards the viewer.
-    pub(crate) fn normal(&self) -> Vec3 {
-        self.offset.extend(self.height).normalize_or(Vec3::Z)
-    }
-}
-
 impl Cone {
-    /// The cone from `start` to `end`. `reach` says how far it must go on beyond either end, in radii: 1 at tips
-    /// and forks, less where the chain goes on nearly straight (see [`reach_at_joint`]).
-    pub(crate) fn new(start: Ball, end: Ball, reach: [f64; 2]) -> Self {
-        let axis = end.center - start.center;
-        let length = axis.length();
-        let unit = if length > 0.0 { axis / length } else { DVec3::Z };
+    /// The cone from `start` to `end`, where the chain goes on as `joints` say.
+    pub(crate) fn new(start: Ball, end: Ball, joints: [Joint; 2]) -> Self {
+        let (unit, length, k) = axis(start, end);
         let seen = unit.truncate().length();
         let along = if seen > 1e-9 { unit.truncate() / seen } else { glam::DVec2::X };
-        let k = if length > 0.0 { (end.radius - start.radius) / length } else { 0.0 };
+        let bend = |joint: Joint, chain: &dyn Fn(Ball) -> [Ball; 3]| match joint {
+            Joint::Chain(ball) => Bend::new(chain(ball)),
+            Joint::End => Bend { reach: 1.0, axis: unit, taper: k, is_end: true },
+        };
+        let before = bend(joints[0], &|ball| [ball, start, end]);
+        let after = bend(joints[1], &|ball| [start, end, ball]);
         // The surface at axis place s lies at x = s m − k r, shifted by up to |u_z| r where the axis is tilted:
         // this much on either side of an end even where the chain goes straight on.
         let lean = |radius: f64| (k.abs() + unit.z.abs()).min(1.0) * radius + 1.0;
         let slack = |radius: f64, reach: f64| (reach + k.abs() + unit.z.abs()).min(1.0) * radius + 1.0;
         let range = [
-            (-slack(start.radius, reach[0])).min(length * seen - lean(end.radius)),
-            (length * seen + slack(end.radius, reach[1])).max(lean(start.radius)),
+            (-slack(start.radius, before.reach)).min(length * seen - lean(end.radius)),
+            (length * seen + slack(end.radius, after.reach)).max(lean(start.radius)),
         ];
         Self {
             start: start.center.as_vec3(),
@@ -95,7 +112,26 @@ impl Cone {
             length: length as f32,
             k: k as f32,
             range: range.map(|bound| bound as f32),
+            lit: [before, after].map(|bend| LitEnd {
+                axis: bend.axis.as_vec3(),
+                taper: bend.taper as f32,
+                is_end: bend.is_end,
+            }),
         }
+    }
+
+    /// The unit normal that light sees at a place, towards the viewer.
+    pub(crate) fn normal(&self, hit: &Hit) -> Vec3 {
+        let exact = hit.offset.extend(hit.height).normalize_or(Vec3::Z);
+        let (from, to) = (self.lit[0], self.lit[1]);
+        let on_ball = (hit.share <= 0.0 && from.is_end) || (hit.share >= 1.0 && to.is_end);
+        if on_ball {
+            return exact;
+        }
+        let axis = (from.axis + hit.share * (to.axis - from.axis)).normalize_or(Vec3::X);
+        let taper = (from.taper + hit.share * (to.taper - from.taper)).clamp(-0.95, 0.95);
+        let across = (exact - axis * exact.dot(axis)).normalize_or(exact);
+        (across * (1.0 - taper * taper).sqrt() - axis * taper).normalize_or(exact)
     }
 
     /// The box that holds the cone: low and high corner.
@@ -210,22 +246,43 @@ impl Cone {
     }
 }
 
-/// How far, in radii, two cones must reach beyond the joint of a chain that they share: tan(turn/2) fills the
-/// wedge on the outer side, the change of taper moves the borders of their surfaces.
-pub(crate) fn reach_at_joint(before: Ball, joint: Ball, after: Ball) -> f64 {
-    let (p, q) = (joint.center - before.center, after.center - joint.center);
-    let (p_length, q_length) = (p.length(), q.length());
-    if p_length == 0.0 || q_length == 0.0 {
-        return 1.0;
+/// Unit axis, length and taper from one ball to the next.
+fn axis(start: Ball, end: Ball) -> (DVec3, f64, f64) {
+    let axis = end.center - start.center;
+    let length = axis.length();
+    if length > 0.0 {
+        (axis / length, length, (end.radius - start.radius) / length)
+    } else {
+        (DVec3::Z, 0.0, 0.0)
     }
-    let cos = p.dot(q) / (p_length * q_length);
-    if cos <= 0.0 {
-        return 1.0;
+}
+
+/// An end of a cone.
+struct Bend {
+    /// How far, in radii, the cones must reach beyond it: tan(turn/2) fills the wedge on the outer side, and the
+    /// change of taper moves the borders of their surfaces.
+    reach: f64,
+    /// The axis and the taper half way between the two cones.
+    axis: DVec3,
+    taper: f64,
+    /// Whether nothing follows.
+    is_end: bool,
+}
+
+impl Bend {
+    fn new([before, joint, after]: [Ball; 3]) -> Self {
+        let (p, p_length, p_taper) = axis(before, joint);
+        let (q, q_length, q_taper) = axis(joint, after);
+        let cos = if p_length > 0.0 && q_length > 0.0 { p.dot(q) } else { -1.0 };
+        // tan(turn/2) = √((1 − cos)/(1 + cos)); a sharp turn takes the whole ball.
+        let tan_half = if cos > 0.0 { ((1.0 - cos).max(0.0) / (1.0 + cos)).sqrt() } else { 1.0 };
+        Self {
+            reach: (tan_half + (q_taper - p_taper).abs()).min(1.0),
+            axis: (p + q).normalize_or(q),
+            taper: 0.5 * (p_taper + q_taper),
+            is_end: false,
+        }
     }
-    // tan(turn/2) = √((1 − cos)/(1 + cos)).
-    let tan_half = ((1.0 - cos).max(0.0) / (1.0 + cos)).sqrt();
-    let taper_change = (after.radius - joint.radius) / q_length - (joint.radius - before.radius) / p_length;
-    (tan_half + taper_change.abs()).min(1.0)
 }
 
 #[cfg(test)]
@@ -261,7 +318,7 @@ mod tests {
             (ball(20.0, 15.0, 4.0, 5.0), ball(20.0, 15.0, -8.0, 5.0)),
         ];
         for (start, end) in cases {
-            let cone = Cone::new(start, end, [1.0, 1.0]);
+            let cone = Cone::new(start, end, [Joint::End; 2]);
             let mut n_inside = 0;
             for y in 0..30 {
                 for x in 0..45 {
@@ -289,7 +346,7 @@ mod tests {
 
     #[test]
     fn outline_distance_is_right() {
-        let cone = Cone::new(ball(10.0, 10.0, 0.0, 4.0), ball(30.0, 10.0, 0.0, 4.0), [1.0, 1.0]);
+        let cone = Cone::new(ball(10.0, 10.0, 0.0, 4.0), ball(30.0, 10.0, 0.0, 4.0), [Joint::End; 2]);
         let outside = |x: f32, y: f32| cone.at(Vec2::new(x, y), 5.0).expect("near").outside;
         assert!((outside(20.0, 10.0) + 4.0).abs() < 1e-5);
         assert!((outside(20.0, 15.0) - 1.0).abs() < 1e-5);

@@ -46,10 +46,12 @@ pub(crate) fn heading(face: &Face, said: &Heading, width: u32, colors: &PageColo
     let mut marks = Vec::new();
     let mut y = margin;
     let title: Vec<String> = said.title.iter().cloned().collect();
+    let (n_verdicts, n_facts) = if Page::is_thumbnail(width) { (1, 0) } else { (usize::MAX, usize::MAX) };
+    let first = |parts: &[String], n: usize| parts[..n.min(parts.len())].to_vec();
     for (parts, size, color, is_strong) in [
         (&title, TITLE * unit, colors.ink, true),
-        (&said.verdict, BODY * unit, colors.ink, false),
-        (&said.facts, BODY * unit, colors.soft, false),
+        (&first(&said.verdict, n_verdicts), BODY * unit, colors.ink, false),
+        (&first(&said.facts, n_facts), BODY * unit, colors.soft, false),
     ] {
         for text in face.lines(parts, size as f32, room) {
             let at = DVec2::new(margin, y + 0.8 * size);
@@ -63,7 +65,7 @@ pub(crate) fn heading(face: &Face, said: &Heading, width: u32, colors: &PageColo
 /// The size of the key in pixels.
 pub(crate) fn key_size(face: &Face, coloring: &Coloring, width: u32) -> DVec2 {
     let unit = Page::unit_px(width);
-    let bar = coloring.scale.as_ref().map_or(DVec2::ZERO, |scale| {
+    let bar = shown_scale(coloring, width).map_or(DVec2::ZERO, |scale| {
         let texts = scale.ticks.iter().map(|tick| face.width(&tick.text, (SMALL * unit) as f32));
         let caption = f64::from(face.width(&scale.caption, (BODY * unit) as f32));
         let ticks = BAR.x * unit + unit + f64::from(texts.fold(0.0, f32::max));
@@ -77,12 +79,17 @@ pub(crate) fn key(page: &Page, coloring: &Coloring, params: &Params, colors: &Pa
     let unit = page.unit_px;
     let mut groups = Vec::new();
     let mut at = page.key_at;
-    if let Some(scale) = &coloring.scale {
+    if let Some(scale) = shown_scale(coloring, page.width) {
         groups.push(color_bar(at, unit, coloring, scale, colors));
         at.y += (BAR.y + 3.4) * unit;
     }
     groups.extend(scale_bar(page, at, params, colors));
     groups
+}
+
+/// The scale, if the page has room for it.
+fn shown_scale(coloring: &Coloring, width: u32) -> Option<&Scale> {
+    coloring.scale.as_ref().filter(|_| !Page::is_thumbnail(width))
 }
 
 fn color_bar(at: DVec2, unit: f64, coloring: &Coloring, scale: &Scale, colors: &PageColors) -> Group {

@@ -46,7 +46,7 @@ use coloring::Coloring;
 pub use error::Error;
 use furniture::Heading;
 use kinship::Kinship;
-use page::{Needs, Page};
+use page::{Needs, Page, Pen};
 use palette::PageColors;
 pub use params::{ColorBy, Compass, Params, Style, Theme, Unit};
 use raster::{Job, Pixel};
@@ -99,14 +99,8 @@ pub fn render(
     let (page, groups) = artist.lay_out(&map, &said, None)?;
     let pixels = artist.draw(&map, &page, Depth::Flat);
     let title = params.title.as_deref().unwrap_or("planar map of a tree");
-    let content = svg::Content {
-        tree,
-        branches: artist.branches,
-        scene: &map,
-        coloring: artist.coloring,
-        style: params.style,
-        title,
-    };
+    let content =
+        svg::Content { tree, branches: artist.branches, scene: &map, coloring: artist.coloring, title };
     let layers = || layers::Layers::new(tree, artist.branches, embedding, (&page, &pixels)).encode();
 
     Ok(Rendered {
@@ -159,9 +153,10 @@ impl Artist<'_> {
         let needs = Needs {
             heading_px,
             key_px: furniture::key_size(face, coloring, params.width_px),
-            rim_px: unit_px * if axes.is_some() { 3.0 } else { 2.2 },
+            rim_px: unit_px * if axes.is_some() { 4.2 } else { 2.2 },
         };
-        let page = Page::lay_out(tree, scene, (params.width_px, params.min_width_px), &needs)?;
+        let pen = Pen { min_width_px: params.min_width_px, style: params.style };
+        let page = Page::lay_out(tree, scene, (params.width_px, pen), &needs)?;
         let mut groups = vec![heading];
         groups.extend(furniture::key(&page, coloring, params, colors));
         groups.push(furniture::root_mark(&page, tree, scene, colors));
@@ -171,15 +166,14 @@ impl Artist<'_> {
 
     fn draw(&self, scene: &Scene, page: &Page, depth: Depth) -> Vec<Pixel> {
         let kinship = Kinship::new(self.tree, self.branches, scene, page.px_per_mm);
-        let style = self.params.style;
-        let drawn = sketch::edges(self.tree, scene, page, self.coloring, (&kinship, style));
+        let drawn = sketch::edges(self.tree, scene, page, self.coloring, &kinship);
         raster::rasterise(&Job {
             size: [page.width as usize, page.height as usize],
             drawn: &drawn,
             kinship: &kinship,
             palette: &self.coloring.palette,
             colors: self.colors,
-            style,
+            style: self.params.style,
             has_depth: depth == Depth::Spatial,
         })
     }
@@ -206,7 +200,7 @@ fn report(tree: &Tree, scene: &Scene, page: &Page, pixels: &[Pixel]) -> Report {
     report.count("height_px", page.height);
     report.count("mm_per_px", 1.0 / page.px_per_mm);
     let is_thin =
-        |&(node, _): &(usize, usize)| scene.radii_mm[node] * page.px_per_mm < 0.5 * page.min_width_px;
+        |&(node, _): &(usize, usize)| scene.radii_mm[node] * page.px_per_mm < 0.5 * page.pen.min_width_px;
     report.count_usize("edges", tree.n_nodes() - 1);
     report.count_usize("edges_at_least_width", tree.edges().filter(is_thin).count());
     let n_covered = pixels.iter().filter(|pixel| pixel.is_covered()).count();

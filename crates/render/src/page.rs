@@ -10,12 +10,17 @@ use espalier_model::Tree;
 use glam::DVec2;
 
 use crate::Error;
+use crate::params::Style;
 use crate::scene::Scene;
 
 /// How many pixels a picture may have: at 28 bytes each, a gigabyte.
 pub(crate) const MAX_PIXELS: u64 = 1 << 25;
 /// Bounds of height over width of the tree's area.
 const ASPECT: [f64; 2] = [0.42, 1.35];
+/// The least layout unit in pixels: small text is then 7 pixels high.
+const LEAST_UNIT_PX: f64 = 6.0;
+/// Narrower pictures are thumbnails: they show the tree, the verdict and the scale bar, and no more.
+const THUMBNAIL_PX: u32 = 480;
 /// A tree smaller than this in every direction has no scale of its own, mm.
 const SMALLEST_MM: f64 = 1e-12;
 
@@ -37,7 +42,7 @@ pub(crate) struct Page {
     pub width: u32,
     /// Height.
     pub height: u32,
-    /// The unit of the layout: a hundredth of the width, and at least 6 pixels where text must be read.
+    /// The unit of the layout: a hundredth of the width, but never so small that text cannot be read.
     pub unit_px: f64,
     /// The scale.
     pub px_per_mm: f64,
@@ -47,14 +52,28 @@ pub(crate) struct Page {
     pub area: [DVec2; 2],
     /// The upper left corner of the key.
     pub key_at: DVec2,
-    /// Whether the key stands at the right edge of the page.
+    /// How wide branches are drawn.
+    pub pen: Pen,
+}
+
+/// How wide branches are drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Pen {
+    /// The least width; the width of every branch in the line style.
     pub min_width_px: f64,
+    /// True radii or lines.
+    pub style: Style,
 }
 
 impl Page {
     /// The layout unit of a page of this width.
     pub(crate) fn unit_px(width: u32) -> f64 {
-        (f64::from(width) / 100.0).max(6.0)
+        (f64::from(width) / 100.0).max(LEAST_UNIT_PX)
+    }
+
+    /// Whether a page of this width has room for the essentials only.
+    pub(crate) fn is_thumbnail(width: u32) -> bool {
+        width < THUMBNAIL_PX
     }
 
     /// The empty border of a page.
@@ -66,32 +85,27 @@ impl Page {
     pub(crate) fn lay_out(
         tree: &Tree,
         scene: &Scene,
-        (width, min_width_px): (u32, f64),
+        (width, pen): (u32, Pen),
         needs: &Needs,
     ) -> Result<Self, Error> {
-        let wide = Self::fit(scene, (width, min_width_px), needs, 0.0)?;
+        let wide = Self::fit(scene, (width, pen), needs, 0.0)?;
         if let Some(key_at) = wide.free_corner(tree, scene, needs.key_px) {
             return Ok(Self { key_at, ..wide });
         }
-        let narrow = Self::fit(scene, (width, min_width_px), needs, needs.key_px.x + wide.unit_px)?;
+        let narrow = Self::fit(scene, (width, pen), needs, needs.key_px.x + wide.unit_px)?;
         let key_at = DVec2::new(f64::from(width) - Self::margin_px(width), narrow.area[1].y) - needs.key_px;
         Ok(Self { key_at: key_at.max(DVec2::new(0.0, needs.heading_px)), ..narrow })
     }
 
     /// The page with a column of `column_px` left free at the right.
-    fn fit(
-        scene: &Scene,
-        (width, min_width_px): (u32, f64),
-        needs: &Needs,
-        column_px: f64,
-    ) -> Result<Self, Error> {
+    fn fit(scene: &Scene, (width, pen): (u32, Pen), needs: &Needs, column_px: f64) -> Result<Self, Error> {
         let unit_px = Self::unit_px(width);
         let margin = Self::margin_px(width);
         let (low, high) = scene.bounds_mm();
         let size_mm = (high - low).max(DVec2::splat(SMALLEST_MM));
 
         // The room for the tree itself, inside the rim and half a line all round.
-        let rim = needs.rim_px + 0.5 * min_width_px;
+        let rim = needs.rim_px + 0.5 * pen.min_width_px;
         let room_x = (f64::from(width) - 2.0 * margin - column_px - 2.0 * rim).max(unit_px);
         let aspect = (size_mm.y / size_mm.x).clamp(ASPECT[0], ASPECT[1]);
         let room = DVec2::new(room_x, (room_x * aspect).max(needs.key_px.y));
@@ -107,7 +121,7 @@ impl Page {
         let origin_px = 0.5 * (area_low + area_high) - px_per_mm * DVec2::new(center_mm.x, -center_mm.y);
         let area = [area_low, area_high];
         let key_at = area_low;
-        Ok(Self { width, height, unit_px, px_per_mm, origin_px, area, key_at, min_width_px })
+        Ok(Self { width, height, unit_px, px_per_mm, origin_px, area, key_at, pen })
     }
 
     /// The pixel of a scene point.
@@ -117,7 +131,11 @@ impl Page {
 
     /// The drawn radius of a node in pixels: never under half the least width.
     pub(crate) fn radius_px(&self, radius_mm: f64) -> f64 {
-        (radius_mm * self.px_per_mm).max(0.5 * self.min_width_px)
+        let least = 0.5 * self.pen.min_width_px;
+        match self.pen.style {
+            Style::PseudoSurface => (radius_mm * self.px_per_mm).max(least),
+            Style::Line => least,
+        }
     }
 
     /// The first corner in which a box of `size` touches no branch.

@@ -26,6 +26,9 @@ const ORDERED: [u32; 5] = [0xc7_e9b4, 0x7f_cdbb, 0x41_b6c4, 0x2c_7fb8, 0x25_3494
 /// YlOrRd after a cool grey that says "nothing lost": for losses.
 const LOSSES: [u32; 5] = [0xc6_d0d8, 0xfe_d976, 0xfd_8d3c, 0xe3_1a1c, 0x80_0026];
 
+/// The same for a dark page: the worst must be the brightest.
+const LOSSES_ON_DARK: [u32; 5] = [0x5a_646e, 0xb1_0026, 0xe3_1a1c, 0xfd_8d3c, 0xff_eda0];
+
 /// The colours of Okabe and Ito without black and yellow, lightened a little by the shading: for names.
 const NAMES: [u32; 6] = [0xe6_9f00, 0x56_b4e9, 0x00_9e73, 0x00_72b2, 0xd5_5e00, 0xcc_79a7];
 
@@ -43,14 +46,18 @@ impl Palette {
         Self::continuous(&DIVERGING)
     }
 
-    /// Light green to dark blue.
-    pub(crate) fn ordered() -> Self {
-        Self::continuous(&ORDERED)
+    /// Light green to dark blue; the other way round on a dark page, where the fine far branches must be light.
+    pub(crate) fn ordered(theme: Theme) -> Self {
+        let mut anchors = ORDERED;
+        if theme == Theme::Dark {
+            anchors.reverse();
+        }
+        Self::continuous(&anchors)
     }
 
-    /// Grey to dark red.
-    pub(crate) fn losses() -> Self {
-        Self::continuous(&LOSSES)
+    /// Grey, then ever further from the colour of the page.
+    pub(crate) fn losses(theme: Theme) -> Self {
+        Self::continuous(if theme == Theme::Dark { &LOSSES_ON_DARK } else { &LOSSES })
     }
 
     /// Unordered colours for names.
@@ -209,7 +216,7 @@ mod tests {
 
     #[test]
     fn steps_and_names() {
-        let steps = Palette::ordered().in_steps(3);
+        let steps = Palette::ordered(Theme::Light).in_steps(3);
         assert_eq!(steps.len(), 3);
         assert_eq!(hex(steps.at(steps.value_of(0))), "#c7e9b4");
         assert_eq!(hex(steps.at(steps.value_of(2))), "#253494");

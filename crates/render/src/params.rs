@@ -80,8 +80,9 @@ pub enum Compass {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
-    /// Width of the pictures in pixels, 160 to 16384; the height follows from the shape of the tree. Default
-    /// 1600: fills a screen, and prints 13.5 cm wide at 300 dpi. Larger shows finer branches and takes longer.
+    /// Width of the pictures in pixels, 240 to 16384; the height follows from the shape of the tree. Default
+    /// 1600: fills a screen, and prints 13.5 cm wide at 300 dpi. Larger shows finer branches and takes longer; under
+    /// 480 only the tree, the verdict and the scale bar find room.
     pub width_px: u32,
     /// How the branches are drawn. Default the pseudo-surface.
     pub style: Style,
@@ -137,8 +138,8 @@ impl Params {
         let Self { width_px, width_scale, min_width_px, .. } = *self;
         ParamError::check(
             "width_px",
-            (160..=16_384).contains(&width_px),
-            format!("must be 160 to 16384 pixels, is {width_px}"),
+            (240..=16_384).contains(&width_px),
+            format!("must be 240 to 16384 pixels, is {width_px}"),
         )?;
         ParamError::check(
             "width_scale",

@@ -31,7 +31,7 @@ const TILE_SAMPLES: usize = TILE * SAMPLES;
 /// A sample this far outside an outline is still partly covered: half a sample.
 const FRINGE_PX: f32 = 0.5 / SAMPLES as f32;
 /// Cones that end lower than this share of the radius below the highest have no say in the normal.
-const BLEND_SHARE: f32 = 0.45;
+const BLEND_SHARE: f32 = 0.7;
 /// Two cones blend if the path between them is at most this many of their radii.
 const BLEND_REACH: f32 = 2.0;
 /// Width of the gap beside a branch that passes in front.
@@ -309,7 +309,7 @@ fn add(job: &Job<'_>, blend: &mut Blend, best: &Best, (index, edge, hit): (u32, 
     if fade > 0.0 && is_near(BLEND_REACH) {
         let weight = if index == best.index { 1.0 } else { fade * fade };
         let color = job.palette.at(edge.values[0] + hit.share * (edge.values[1] - edge.values[0]));
-        blend.normal += weight * hit.normal();
+        blend.normal += weight * edge.cone.normal(&hit);
         blend.color = std::array::from_fn(|k| blend.color[k] + weight * color[k]);
         blend.weight += weight;
     }

@@ -19,7 +19,7 @@ const HALFWAY: Vec3 = Vec3::new(-0.233_953, -0.292_442, 0.927_227);
 const WRAP: f32 = 0.35;
 const AMBIENT: f32 = 0.50;
 const DIFFUSE: f32 = 0.56;
-const HIGHLIGHT: f32 = 0.22;
+const HIGHLIGHT: f32 = 0.13;
 /// How much of the rim's dark the surface takes where it is seen edge on.
 const RIM: f32 = 0.55;
 /// Width of the outline in pixels, and its largest share of the radius.

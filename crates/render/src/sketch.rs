@@ -6,10 +6,9 @@
 use espalier_model::Tree;
 
 use crate::coloring::Coloring;
-use crate::cone::{Ball, Cone, reach_at_joint};
+use crate::cone::{Ball, Cone, Joint};
 use crate::kinship::Kinship;
 use crate::page::Page;
-use crate::params::Style;
 use crate::raster::Drawn;
 use crate::scene::Scene;
 
@@ -19,15 +18,12 @@ pub(crate) fn edges(
     scene: &Scene,
     page: &Page,
     coloring: &Coloring,
-    (kinship, style): (&Kinship, Style),
+    kinship: &Kinship,
 ) -> Vec<Drawn> {
     let balls: Vec<Ball> = (0..tree.n_nodes())
         .map(|node| {
             let point = scene.points_mm[node];
-            let radius = match style {
-                Style::PseudoSurface => page.radius_px(scene.radii_mm[node]),
-                Style::Line => 0.5 * page.min_width_px,
-            };
+            let radius = page.radius_px(scene.radii_mm[node]);
             let center = page.px(point.truncate()).extend(point.z * page.px_per_mm);
             Ball { center, radius }
         })
@@ -39,17 +35,17 @@ pub(crate) fn edges(
         arc_px: [kinship.arc_px[parent], kinship.arc_px[node]],
     };
     if tree.n_nodes() == 1 {
-        return vec![drawn(0, 0, Cone::new(balls[0], balls[0], [1.0, 1.0]))];
+        return vec![drawn(0, 0, Cone::new(balls[0], balls[0], [Joint::End; 2]))];
     }
     tree.edges()
         .map(|(node, parent)| {
             let before = tree.parent(parent).filter(|_| tree.children(parent).len() == 1);
             let after = Some(tree.children(node)).filter(|children| children.len() == 1);
-            let reach = [
-                before.map_or(1.0, |before| reach_at_joint(balls[before], balls[parent], balls[node])),
-                after.map_or(1.0, |after| reach_at_joint(balls[parent], balls[node], balls[after[0]])),
+            let joints = [
+                before.map_or(Joint::End, |before| Joint::Chain(balls[before])),
+                after.map_or(Joint::End, |after| Joint::Chain(balls[after[0]])),
             ];
-            drawn(node, parent, Cone::new(balls[parent], balls[node], reach))
+            drawn(node, parent, Cone::new(balls[parent], balls[node], joints))
         })
         .collect()
 }

@@ -40,8 +40,6 @@ pub(crate) struct Content<'a> {
     pub scene: &'a Scene,
     /// Its colours.
     pub coloring: &'a Coloring,
-    /// Lines or outlines.
-    pub style: Style,
     /// What the document is called.
     pub title: &'a str,
 }
@@ -93,7 +91,7 @@ fn tree(out: &mut String, content: &Content<'_>, page: &Page, colors: &PageColor
         );
         return;
     }
-    if content.style == Style::PseudoSurface {
+    if page.pen.style == Style::PseudoSurface {
         let rim = hex(colors.rim);
         let _ = writeln!(
             out,
@@ -132,13 +130,13 @@ fn write_branch(
         .polyline()
         .map(|node| (page.px(scene.points_mm[node].truncate()), page.radius_px(scene.radii_mm[node])))
         .collect();
-    let paint = match content.style {
+    let paint = match page.pen.style {
         Style::PseudoSurface => format!("d=\"{}\" fill=\"{fill}\"", outline(&points)),
         Style::Line => format!(
             "d=\"{}\" fill=\"none\" stroke=\"{fill}\" stroke-width=\"{:.2}\" stroke-linecap=\"round\" \
              stroke-linejoin=\"round\"",
             polyline(&points),
-            page.min_width_px
+            page.pen.min_width_px
         ),
     };
     let parent = branch.parent.map_or_else(String::new, |parent| format!(" data-parent=\"{parent}\""));

@@ -1,4 +1,5 @@
 //! Trees and embeddings made by hand.
+#![allow(clippy::expect_used, reason = "a test that cannot go on must fail")]
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
 use espalier_geom::math;
