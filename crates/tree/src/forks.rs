@@ -10,7 +10,7 @@
 //! if it is long enough for that, where its own spheres are clear of those of the fork's other lines.
 //! 2. The fork is the point nearest to all of them, each weighted by the inverse of its variance; the skeleton's own
 //! fork counts as one measurement with a standard deviation of its radius, so that axes that meet badly change little.
-//! 3. The move is bounded by `MAX_MOVE` radii, by half of each line's length, and by the mask.
+//! 3. The move is bounded by `MAX_MOVE` radii, by a share of each line's length, and by the mask.
 //! 4. Samples between the fork and the fitted stretch give way to the straight connection.
 //! **Guarantees** a fork does not leave the mask by this step; lines keep their ends and order.
 //! **Source** own; the idea that a bifurcation is best located from outside of it is common in vessel analysis.
@@ -35,6 +35,8 @@ const CLEAR: f64 = 0.95;
 const MERGED_REACH: f64 = 5.0;
 /// How far a fork may move, in radii of its own sphere.
 const MAX_MOVE: f64 = 2.0;
+/// How far a fork may move, as a share of each line at it: two forks that move towards each other stay apart.
+const MAX_SHARE: f64 = 0.4;
 /// What the position of a line is known to at best, in spacings of the grid: the scatter of sphere centres.
 const SCATTER: f64 = 0.2;
 
@@ -45,6 +47,16 @@ struct Arm {
     length_mm: f64,
     /// The fitted stretch as (first sample, fit), counted from the fork.
     fit: Option<(usize, Fit)>,
+}
+
+/// What becomes of one end of a line.
+struct LineEnd {
+    /// The fork's new place.
+    target: Sample,
+    /// By how much the fork moved.
+    shift: DVec3,
+    /// How many samples give way to the straight connection; `None` if the line's axis is not known.
+    merged: Option<usize>,
 }
 
 /// Moves all forks of three or more lines; returns the mean distance moved in mm.
@@ -59,14 +71,22 @@ pub(crate) fn relocate(outline: &mut Outline, mask: &Mask) -> f64 {
         .map(|(&hub, arms)| meeting_point(outline.hubs[hub].sample, arms, scatter_mm, mask))
         .collect();
 
+    let mut ends: Vec<[Option<LineEnd>; 2]> = outline.lines.iter().map(|_| [None, None]).collect();
     let mut total_mm = 0.0;
     for ((&hub, arms), &target) in forks.iter().zip(&arms).zip(&moved) {
-        let before = outline.hubs[hub].sample;
-        total_mm += before.position_mm.distance(target.position_mm);
+        let shift = target.position_mm - outline.hubs[hub].sample.position_mm;
+        if shift == DVec3::ZERO {
+            continue;
+        }
+        total_mm += shift.length();
         outline.hubs[hub] = Hub { sample: target, ..outline.hubs[hub] };
         for arm in arms {
-            lead_to(outline, arm, before, target);
+            let merged = arm.fit.as_ref().map(|(first, _)| *first);
+            ends[arm.line][usize::from(!arm.is_outgoing)] = Some(LineEnd { target, shift, merged });
         }
+    }
+    for (line, ends) in outline.lines.iter_mut().zip(&ends) {
+        line.samples = led_to(&line.samples, ends);
     }
     if forks.is_empty() { 0.0 } else { total_mm / forks.len() as f64 }
 }
@@ -154,11 +174,13 @@ fn meeting_point(fork: Sample, arms: &[Arm], scatter_mm: f64, mask: &Mask) -> Sa
     }
     let mut shift = normal.inverse() * right - fork.position_mm;
 
-    let half_arm_mm = arms.iter().map(|arm| 0.5 * arm.length_mm).fold(f64::INFINITY, f64::min);
-    shift = shift.clamp_length_max(half_arm_mm.min(MAX_MOVE * fork.radius_mm));
+    let shortest_mm = arms.iter().map(|arm| arm.length_mm).fold(f64::INFINITY, f64::min);
+    let limit_mm = (MAX_SHARE * shortest_mm).min(MAX_MOVE * fork.radius_mm);
+    shift = shift.clamp_length_max(limit_mm);
     while !is_inside(mask, fork.position_mm + shift) {
         shift *= 0.5;
-        if shift.length() < scatter_mm {
+        // Also left by a shift that is no number.
+        if shift.length().max(0.0) < scatter_mm {
             return fork;
         }
     }
@@ -166,25 +188,29 @@ fn meeting_point(fork: Sample, arms: &[Arm], scatter_mm: f64, mask: &Mask) -> Sa
     Sample { position_mm: fork.position_mm + shift, radius_mm: thickest_mm }
 }
 
-/// Leads a line to the new place of its fork.
-fn lead_to(outline: &mut Outline, arm: &Arm, before: Sample, target: Sample) {
-    let line = &mut outline.lines[arm.line];
-    let mut samples = seen_from(&line.samples, arm.is_outgoing);
-    match &arm.fit {
-        Some((first, _)) => {
-            samples.drain(..*first);
-            samples.insert(0, target);
-        }
-        None => {
-            // Too short to know its axis: the move fades out over the line.
-            let shift = target.position_mm - before.position_mm;
-            let arcs = arc_lengths_mm(&samples);
-            let total_mm = arcs[arcs.len() - 1].max(f64::MIN_POSITIVE);
-            for (sample, arc_mm) in samples.iter_mut().zip(arcs) {
-                sample.position_mm += shift * (1.0 - arc_mm / total_mm);
+/// A line led to the new places of the forks at its ends.
+fn led_to(samples: &[Sample], [start, end]: &[Option<LineEnd>; 2]) -> Vec<Sample> {
+    let arcs = arc_lengths_mm(samples);
+    let total_mm = arcs[arcs.len() - 1].max(f64::MIN_POSITIVE);
+    let mut led = samples.to_vec();
+
+    // Where a line is too short to know its axis, the move of its end fades out over it.
+    for (sample, arc_mm) in led.iter_mut().zip(arcs) {
+        let share = arc_mm / total_mm;
+        for (end, weight) in [(start, 1.0 - share), (end, share)] {
+            if let Some(LineEnd { shift, merged: None, .. }) = end {
+                sample.position_mm += *shift * weight;
             }
-            samples[0] = target;
         }
     }
-    line.samples = seen_from(&samples, arm.is_outgoing);
+
+    // Where it is known, what lies before it gives way; if both ends claim the same samples, all between them does.
+    let n_merged = |end: &Option<LineEnd>| end.as_ref().map_or(1, |end| end.merged.unwrap_or(1).max(1));
+    let first = n_merged(start);
+    let last = led.len().saturating_sub(n_merged(end)).max(first);
+    let end_sample = |end: &Option<LineEnd>, sample: Sample| end.as_ref().map_or(sample, |end| end.target);
+    let mut line = vec![end_sample(start, led[0])];
+    line.extend_from_slice(led.get(first..last).unwrap_or_default());
+    line.push(end_sample(end, led[led.len() - 1]));
+    line
 }

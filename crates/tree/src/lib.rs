@@ -45,6 +45,9 @@ use glam::DVec3;
 pub use error::Error;
 pub use params::{Components, Loops, MissingRadii, Params, Resample, Root, Roots, Tips};
 
+/// Edges shorter than this share of the smallest spacing are no shape of the organ.
+const RESOLUTION: f64 = 0.2;
+
 /// A tree, what was done to get it, and its figures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Built {
@@ -96,8 +99,11 @@ pub fn build(
     smooth::space_evenly(&mut outline, mask.grid());
     smooth::smooth(&mut outline, mask.grid(), params.smooth_voxels);
 
+    // Two forks nearer to each other than voxels can tell are one.
+    let resolution_mm = RESOLUTION * mask.grid().spacing_mm().min_element();
+    let nodes = merge::merge_near(&outline_nodes(&outline), resolution_mm, &mut ledger);
     let kind = if params.resample == Resample::Auto { Resample::Shape } else { params.resample };
-    finish(&outline_nodes(&outline), kind, params, ledger, report)
+    finish(&nodes, kind, params, ledger, report)
 }
 
 /// Makes one rooted tree of a traced structure.
@@ -159,15 +165,15 @@ fn outline_nodes(outline: &outline::Outline) -> Vec<Node> {
     nodes
 }
 
-/// Merges what lies at one place, resamples, and describes the result.
+/// Resamples, and describes the result.
 fn finish(
     nodes: &[Node],
     kind: Resample,
     params: &Params,
-    mut ledger: Ledger,
+    ledger: Ledger,
     mut report: Report,
 ) -> Result<Built, Error> {
-    let dense = Tree::new(&merge::merge_near(nodes, &mut ledger))?;
+    let dense = Tree::new(nodes)?;
     let tree = Tree::new(&resample::resample(&dense, kind, params))?;
     summary::describe(&tree, &ledger, &mut report);
     Ok(Built { tree, ledger, report })

@@ -2,8 +2,8 @@
 //!
 //! **Input** the tree of pieces, before pruning for the protected tips and after it for the choice. **Output** a tip,
 //! and the runner-up.
-//! **Policies** `thickest-tip`: the tip of the largest calibre; `superior`: the tip with the largest third RAS
-//! coordinate; a point given by the user: the tip nearest to it. Ties go to the lower hub index; stubs of opened
+//! **Policies** `thickest-tip`: the tip of the largest calibre; `superior`: the tip whose organ reaches highest, by the
+//! third RAS coordinate of its end plus its calibre, since a thick branch's skeleton ends that much earlier; a point given by the user: the tip nearest to it. Ties go to the lower hub index; stubs of opened
 //! loops are chosen only if there is nothing else.
 //! **Calibre** A tip's own sphere is small wherever a skeleton ends near the surface, so the calibre of a tip is the
 //! radius of the largest sphere on its branch that reaches it.
@@ -52,7 +52,7 @@ pub(crate) fn choose(living: &Living<'_>, params: &Params) -> Choice {
     let hubs = &living.graph.hubs;
     let score = |tip: usize| match (params.root_mm, params.root) {
         (Some(point), _) => -hubs[tip].sample.position_mm.distance(DVec3::from_array(point)),
-        (None, Root::Superior) => hubs[tip].sample.position_mm.z,
+        (None, Root::Superior) => hubs[tip].sample.position_mm.z + calibre_mm(living, tip),
         (None, Root::ThickestTip) => calibre_mm(living, tip),
     };
     let mut ranked: Vec<(bool, f64, usize)> =

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Places, inputs, run, tree_of};
+use common::{Places, inputs, tree_of};
 use espalier_model::diagnose::Class;
 use espalier_model::{Diagnose, InscribedSpheres, LedgerKind, Mask, Skeleton};
 use espalier_tree::{Components, Error, Loops, Params, Root, Tips, build};
@@ -12,6 +12,20 @@ const SHAPE: [usize; 3] = [60, 60, 9];
 
 fn at(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
+}
+
+/// A straight run of voxels, both ends included; steps along the largest difference.
+fn run(from: [i64; 3], to: [i64; 3], radius: f64) -> Places {
+    let n = (0..3).map(|axis| (to[axis] - from[axis]).abs()).max().unwrap_or(0);
+    (0..=n)
+        .map(|i| {
+            let voxel = [0, 1, 2].map(|axis| {
+                let share = if n == 0 { 0.0 } else { i as f64 / n as f64 };
+                (from[axis] as f64 + share * (to[axis] - from[axis]) as f64).round() as u32
+            });
+            (voxel, radius)
+        })
+        .collect()
 }
 
 /// A Y in the plane z = 4: stem up the y axis, arms to both sides; radii fall outwards.

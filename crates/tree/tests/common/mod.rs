@@ -8,20 +8,6 @@ use glam::DVec3;
 /// Voxels with the radius of their sphere, in voxels of a 1 mm grid.
 pub(crate) type Places = Vec<([u32; 3], f64)>;
 
-/// A straight run of voxels, both ends included; steps along the largest difference.
-pub(crate) fn run(from: [i64; 3], to: [i64; 3], radius: f64) -> Places {
-    let n = (0..3).map(|axis| (to[axis] - from[axis]).abs()).max().expect("three axes");
-    (0..=n)
-        .map(|i| {
-            let voxel = [0, 1, 2].map(|axis| {
-                let share = if n == 0 { 0.0 } else { i as f64 / n as f64 };
-                (from[axis] as f64 + share * (to[axis] - from[axis]) as f64).round() as u32
-            });
-            (voxel, radius)
-        })
-        .collect()
-}
-
 /// The three inputs of the stage: the mask is the union of the spheres (at least the voxels themselves).
 pub(crate) fn inputs(places: &Places, shape: [usize; 3]) -> (Mask, Skeleton, InscribedSpheres) {
     let grid = Grid::axis_aligned(shape, DVec3::ONE, DVec3::ZERO).expect("a grid");
