@@ -1,7 +1,7 @@
 //! How fast the swarm is, and how its energy falls.
 //!
-//! `cargo run --release -p espalier-embed --example pso_rate -- TREE.swc|neuron|airway|vessel [paper] [s|b|n]
-//! [PARTICLESxITERATIONS] [SEED]`
+//! `cargo run --release -p espalier-embed --example pso_rate -- TREE.swc|neuron|airway|vessel [paper]
+//! [uniform] [s|b|n] [PARTICLESxITERATIONS] [SEED]`
 //!
 //! The seed is that of the phantom and of the swarm. Prints one line per iteration, the rate, and the table of methods.
 #![allow(clippy::print_stdout, clippy::disallowed_methods, reason = "an example that measures")]
@@ -22,6 +22,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     for word in words {
         match word.as_str() {
             "paper" => params = Params::paper(),
+            "uniform" => {
+                let Params { omega_g, omega_p, omega_target, pull, .. } = Params::paper();
+                params = Params { omega_g, omega_p, omega_target, pull, ..params };
+            }
             "s" => params.freedom = Freedom::S,
             "b" => params.freedom = Freedom::B,
             "n" => params.freedom = Freedom::N,

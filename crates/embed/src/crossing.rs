@@ -82,14 +82,13 @@ impl Lanes {
     /// One bit for each lane whose box meets `bounds`.
     #[inline]
     fn meeting(&self, bounds: Box2) -> u32 {
-        let mut is_met = [0_u32; RUN];
-        // No branches and a fixed length: this loop becomes a few vector comparisons.
-        for lane in 0..RUN {
-            is_met[lane] = u32::from(self.x_low[lane] <= bounds.x_high)
+        // No branches and a fixed length: this becomes a few vector comparisons.
+        let is_met: [u32; RUN] = std::array::from_fn(|lane| {
+            u32::from(self.x_low[lane] <= bounds.x_high)
                 & u32::from(bounds.x_low <= self.x_high[lane])
                 & u32::from(self.y_low[lane] <= bounds.y_high)
-                & u32::from(bounds.y_low <= self.y_high[lane]);
-        }
+                & u32::from(bounds.y_low <= self.y_high[lane])
+        });
         is_met.iter().enumerate().fold(0, |bits, (lane, met)| bits | met << lane)
     }
 }

@@ -78,6 +78,31 @@ pub struct Embedded {
 /// # Errors
 /// A parameter out of range, views of another tree, a tree too small or too large for exact arithmetic, a swarm
 /// beyond its memory, or [`Error::Uncertified`] where no layout is free of crossings after rounding.
+///
+/// ```
+/// use espalier_embed::{Params, embed};
+/// use espalier_model::{Node, Tree};
+/// use espalier_views::find_views;
+/// use glam::DVec3;
+///
+/// let node = |x, y, z, parent| Node { position_mm: DVec3::new(x, y, z), radius_mm: 1.0, parent, kind: 0 };
+/// let fork = [
+///     node(0.0, 0.0, 9.0, None),
+///     node(0.0, 0.0, 5.0, Some(0)),
+///     node(3.0, 1.0, 0.0, Some(1)),
+///     node(-3.0, 1.0, 0.0, Some(1)),
+/// ];
+/// let tree = Tree::new(&fork)?;
+/// let views = find_views(&tree, &espalier_views::Params::default(), 0)?.hierarchy;
+/// let embedding = embed(&tree, &views, &Params::default(), 0, &|_| {})?.embedding;
+/// assert!(embedding.certificate.holds());
+/// assert!(embedding.losses.angle3d_error_max_deg < 1e-6);
+///
+/// let alone = Params { particles: 1, ..Params::default() };
+/// let error = embed(&tree, &views, &alone, 0, &|_| {}).unwrap_err();
+/// assert_eq!(error.to_string(), "embed: particles: must be from 3 to 1000000, is 1");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn embed(
     tree: &Tree,
     views: &ViewHierarchy,

@@ -68,13 +68,25 @@ pub enum Freedom {
     N,
 }
 
+impl Freedom {
+    /// The name used in the config and in tables.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::S => "s",
+            Self::B => "b",
+            Self::N => "n",
+        }
+    }
+}
+
 /// Where the particles of a swarm start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Start {
     /// Uniform over the ranges, with P_0 = 0 and P_1 = the radial layout.
     Paper,
-    /// Between the targets and the crossing-free starts, blended subtree by subtree.
+    /// Near the cone, brought towards the targets segment by segment as far as that is free of crossings.
     #[default]
     Relaxed,
 }

@@ -5,13 +5,14 @@
 //! | `projection` | the best global view as it is | as many as there are |
 //! | `radial` | equal angle per tip | none |
 //! | `cone` | nested convex cones that keep sides | none, for any lengths |
-//! | `pso` | the paper's particle swarm, Algorithm 1 | none, or the incumbent wins |
+//! | `pso`, with `start`, `step` | the paper's particle swarm, Algorithm 1 | none, or the incumbent wins |
 
 pub(crate) mod cone;
 pub(crate) mod projection;
 pub(crate) mod pso;
 pub(crate) mod radial;
 pub(crate) mod start;
+mod step;
 
 use espalier_model::TracePoint;
 use glam::DVec2;

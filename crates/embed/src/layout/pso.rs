@@ -8,13 +8,8 @@
 //! **Guarantees** the same numbers for any number of threads: every random number is keyed by (seed, particle,
 //! iteration). An evaluation stops once it cannot beat the particle's own best, which changes no result.
 //! **Differs from the source** P_g is the best ever, as the text says (the listing takes the best of the moment);
-//! ratios are clamped to their ranges. `pull = "subtree"`, ours: per iteration each particle draws one subtree for
-//! ω_g — that subtree, or all but that — and one subtree, segment or piece of a segment for a pull ω_0 to the
-//! targets and for γ, so that what one part of the tree has found can be tried alone: a crossing elsewhere no
-//! longer spoils it.
+//! ratios are clamped to their ranges; `pull = "subtree"`, ours, is explained in `step`.
 //! **Cost** particles · iterations evaluations at most, 24 bytes per particle and ratio.
-
-use std::ops::Range;
 
 use espalier_geom::random::{Purpose, Stream};
 use espalier_model::TracePoint;
@@ -25,8 +20,9 @@ use crate::Progress;
 use crate::batch::{BatchEnergy, CpuEnergy, DofMap, Score, Scratch};
 use crate::error::Error;
 use crate::layout::Layout;
-use crate::layout::start::{self, Incumbents, segments_below};
-use crate::params::{Freedom, Params, Pull};
+use crate::layout::start::{self, Incumbents};
+use crate::layout::step::Rule;
+use crate::params::Params;
 use crate::place;
 use crate::problem::Problem;
 
@@ -50,18 +46,13 @@ pub(crate) fn layout(
     };
     let incumbents = Incumbents { radial: as_particle(radial), cone: as_particle(cone) };
 
-    // P_g ← P_0: where it has no crossing the loop has nothing to do.
+    // P_g ← P_0: where the targets have no crossing the loop has nothing to do.
     let targets = vec![0.0; dofs.dims()];
-    if let Some(score) = energy.evaluate_one(&targets, f64::INFINITY, &mut Scratch::default())
-        && score.crossings == 0
-    {
-        let Score { energy: least, crossings } = score;
-        let point = TracePoint { iteration: 0, evaluations: 1, energy: least, crossings };
-        report(&point, params, progress);
-        let positions = energy.positions(&targets);
-        return Ok(Layout { name, positions, evaluations: 1, trace: vec![point] });
+    if energy.is_planar(&targets, &mut Scratch::default()) {
+        return Ok(targets_met(&energy, name, &targets, params, progress));
     }
     let mut swarm = Swarm::new(start::start(&energy, &incumbents, params, seed), dofs.dims());
+    let rule = Rule { problem, dofs: &dofs, params };
 
     // Algorithm 1: E_p of every particle, P_ig and P_g; then Eq. 5; until no loss is left or c reaches its limit.
     swarm.evaluate(&energy);
@@ -70,7 +61,7 @@ pub(crate) fn layout(
         if swarm.has_no_loss(&dofs) {
             break;
         }
-        swarm.step(problem, &dofs, params, (seed, iteration));
+        swarm.step(&rule, (seed, iteration));
         swarm.evaluate(&energy);
         swarm.record(iteration, params, progress);
     }
@@ -82,13 +73,27 @@ pub(crate) fn layout(
     })
 }
 
-fn name(params: &Params) -> String {
-    let freedom = match params.freedom {
-        Freedom::S => "s",
-        Freedom::B => "b",
-        Freedom::N => "n",
+/// The layout without any loss.
+fn targets_met(
+    energy: &CpuEnergy,
+    name: String,
+    targets: &[f64],
+    params: &Params,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Layout {
+    let score = energy.evaluate_one(targets, f64::INFINITY, &mut Scratch::default());
+    let point = TracePoint {
+        iteration: 0,
+        evaluations: 1,
+        energy: score.map_or(0.0, |score| score.energy),
+        crossings: 0,
     };
-    format!("pso {}x{} {freedom}", params.particles, params.iterations)
+    report(&point, params, progress);
+    Layout { name, positions: energy.positions(targets), evaluations: 1, trace: vec![point] }
+}
+
+fn name(params: &Params) -> String {
+    format!("pso {}x{} {}", params.particles, params.iterations, params.freedom.name())
 }
 
 fn check_memory(params: &Params, dims: usize) -> Result<(), Error> {
@@ -160,18 +165,22 @@ impl Swarm {
     }
 
     /// Eq. 5 for every particle.
-    fn step(&mut self, problem: &Problem, dofs: &DofMap, params: &Params, (seed, iteration): (u64, u32)) {
-        let global_best = &self.global_best;
-        let particles = self.ratios.par_chunks_mut(self.dims).zip(self.velocities.par_chunks_mut(self.dims));
-        particles.zip(self.bests.par_chunks(self.dims)).enumerate().for_each(|(particle, ((p, u), own))| {
-            let mut stream = Stream::new(seed, Purpose::SwarmStep, particle as u32, iteration);
-            match params.pull {
-                Pull::Uniform => step_uniform(p, u, (own, global_best), (params, dofs), &mut stream),
-                Pull::Subtree => {
-                    step_subtree(problem, p, u, (own, global_best), (params, dofs), &mut stream);
+    fn step(&mut self, rule: &Rule, (seed, iteration): (u64, u32)) {
+        let dims = self.dims;
+        let global = &self.global_best;
+        let moving = self.ratios.par_chunks_mut(dims).zip(self.velocities.par_chunks_mut(dims));
+        moving.zip(self.bests.par_chunks(dims)).enumerate().for_each_init(
+            Vec::new,
+            |old, (particle, ((p, u), own))| {
+                let mut stream = Stream::new(seed, Purpose::SwarmStep, particle as u32, iteration);
+                old.clear();
+                old.extend_from_slice(p);
+                rule.step(p, u, (own, global), &mut stream);
+                for dim in 0..p.len() {
+                    u[dim] = p[dim] - old[dim];
                 }
-            }
-        });
+            },
+        );
     }
 
     fn record(&mut self, iteration: u32, params: &Params, progress: &(dyn Fn(Progress) + Sync)) {
@@ -190,84 +199,4 @@ fn report(point: &TracePoint, params: &Params, progress: &(dyn Fn(Progress) + Sy
         energy: point.energy,
         crossings: point.crossings,
     });
-}
-
-/// Eq. 5 as printed.
-fn step_uniform(
-    p: &mut [f64],
-    u: &mut [f64],
-    (own, global): (&[f64], &[f64]),
-    (params, dofs): (&Params, &DofMap),
-    stream: &mut Stream,
-) {
-    for dim in 0..p.len() {
-        let gamma = stream.uniform(-1.0, 1.0);
-        let pull = params.omega_g * (global[dim] - p[dim]) + params.omega_p * (own[dim] - p[dim]);
-        let (low, high) = dofs.range(dim);
-        let next = (p[dim] + pull + params.omega_inertia * (u[dim] + gamma)).clamp(low, high);
-        u[dim] = next - p[dim];
-        p[dim] = next;
-    }
-}
-
-/// Eq. 5 with its pulls confined to subtrees, and the pull to the targets.
-fn step_subtree(
-    problem: &Problem,
-    p: &mut [f64],
-    u: &mut [f64],
-    (own, global): (&[f64], &[f64]),
-    (params, dofs): (&Params, &DofMap),
-    stream: &mut Stream,
-) {
-    let old: Vec<f64> = p.to_vec();
-    for dim in 0..p.len() {
-        p[dim] += params.omega_p * (own[dim] - p[dim]);
-    }
-    // Take the best of all in one subtree, or everywhere else.
-    let taken = draw_subtree(problem, stream);
-    let is_inside = stream.unit() < 0.5;
-    for segment in 0..dofs.n_lengths {
-        if taken.contains(&segment) == is_inside {
-            for dim in std::iter::once(segment).chain(angles_of(problem, dofs, segment..segment + 1)) {
-                p[dim] += params.omega_g * (global[dim] - p[dim]);
-            }
-        }
-    }
-    // In another, or in a piece of a segment, go towards the targets, with a random step beside.
-    let share = params.omega_target * 2.0 * stream.unit();
-    let width = params.omega_inertia * stream.unit() * stream.unit();
-    for dim in draw_move(problem, dofs, stream).into_iter().flatten() {
-        let (low, high) = dofs.range(dim);
-        let gamma = stream.uniform(-1.0, 1.0);
-        p[dim] = (p[dim] * (1.0 - share) + width * (u[dim] + gamma)).clamp(low, high);
-    }
-    for dim in 0..p.len() {
-        u[dim] = p[dim] - old[dim];
-    }
-}
-
-/// One random subtree, as a range of segments; often small, sometimes a single segment.
-fn draw_subtree(problem: &Problem, stream: &mut Stream) -> Range<usize> {
-    let top = stream.below(problem.branches.list().len() as u32) as usize;
-    if stream.unit() < 0.75 { top..top + 1 } else { segments_below(problem, top) }
-}
-
-/// The ratios of a subtree, of a segment, or of a piece of a segment: lengths, then angles.
-fn draw_move(problem: &Problem, dofs: &DofMap, stream: &mut Stream) -> [Range<usize>; 2] {
-    let segments = draw_subtree(problem, stream);
-    let angles = angles_of(problem, dofs, segments.clone());
-    let is_piece = segments.len() == 1 && angles.len() > 1 && stream.unit() < 0.7;
-    if !is_piece {
-        return [segments, angles];
-    }
-    let mut ends = [0, 0].map(|_: u32| angles.start + stream.below(angles.len() as u32) as usize);
-    ends.sort_unstable();
-    [0..0, ends[0]..ends[1] + 1]
-}
-
-/// The angle ratios of a range of segments.
-fn angles_of(problem: &Problem, dofs: &DofMap, segments: Range<usize>) -> Range<usize> {
-    let list = problem.branches.list();
-    let first = dofs.angle[list[segments.start].nodes.start] as usize;
-    first..dofs.angle[list[segments.end - 1].end()] as usize + 1
 }

@@ -463,3 +463,89 @@ same_fields!(
 );
 same_variants!(TargetKind, TargetKindFile { Intrinsic, Projected });
 same_variants!(Termination, TerminationFile { Constructed, Optimal, BudgetSpent });
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::tree::Node;
+
+    fn sample() -> (Tree, Embedding) {
+        let node = |x, parent| Node { position_mm: DVec3::new(x, 0.0, 0.0), radius_mm: 1.0, parent, kind: 0 };
+        let tree = Tree::new(&[node(0.0, None), node(1.0 / 3.0, Some(0))]).expect("a tree");
+        let row = MethodRow {
+            method: "radial".to_owned(),
+            crossings: 0,
+            overlaps: 2,
+            energy: Energy { length: 0.1, angle: 0.2, ..Energy::default() },
+            losses: Losses { spearman: 1.0, ..Losses::default() },
+            evaluations: 3,
+            targets: TargetKind::Projected,
+        };
+        let embedding = Embedding {
+            method: "radial".to_owned(),
+            seed: u64::MAX,
+            positions_mm: vec![DVec2::ZERO, DVec2::new(0.333_3, -0.000_1)],
+            quantum_mm: 1e-4,
+            targets: Targets {
+                kind: TargetKind::Projected,
+                angle_rad: vec![f64::NAN, 0.1 + 0.2],
+                length_mm: vec![0.0, 1.0 / 3.0],
+                heading_rad: vec![0.0; 2],
+                confidence: vec![0.0, 1.0],
+            },
+            length_ratio: vec![0.0; 2],
+            angle_ratio: vec![0.0; 2],
+            energy: row.energy,
+            losses: row.losses,
+            certificate: Certificate::default(),
+            pose: Pose { rotation_rad: 0.3, is_reflected: false },
+            termination: Termination::BudgetSpent,
+            trace: vec![TracePoint { iteration: 0, evaluations: 1, energy: 0.3, crossings: 0 }],
+            methods: vec![row],
+        };
+        (tree, embedding)
+    }
+
+    #[test]
+    fn reads_back_the_same_bits() {
+        let (tree, embedding) = sample();
+        let back = Embedding::from_json(&embedding.to_json(), &tree).expect("our own file");
+        // NaN of the root's angle is not equal to itself; the text holds everything else.
+        assert!(back.targets.angle_rad[0].is_nan());
+        assert_eq!(back.targets.angle_rad[1].to_bits(), embedding.targets.angle_rad[1].to_bits());
+        assert_eq!(back.to_json(), embedding.to_json());
+        assert_eq!(back.methods, embedding.methods);
+    }
+
+    #[test]
+    fn refuses_what_breaks_a_guarantee() {
+        let (tree, embedding) = sample();
+        let refusal = |change: &dyn Fn(&mut Embedding)| {
+            let mut broken = embedding.clone();
+            change(&mut broken);
+            Embedding::from_json(&broken.to_json(), &tree).expect_err("refused").to_string()
+        };
+        for (change, expected) in [
+            (&(|e: &mut Embedding| e.quantum_mm = 2e-4) as &dyn Fn(&mut Embedding), "no power of ten"),
+            (&|e| e.positions_mm[1].x = 0.333_33, "node 1 are not rounded"),
+            (&|e| e.length_ratio.truncate(1), "length_ratio has 1 numbers, the tree needs 2"),
+            (&|e| e.targets.angle_rad[1] = f64::NAN, "no angle for node 1"),
+            (&|e| e.certificate.pairs.push((1, 7)), "edges (1, 7) of a tree of 2 nodes"),
+            (&|e| e.certificate.pairs.push((1, 1)), "more than the 0 crossings"),
+        ] {
+            let message = refusal(change);
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+
+    #[test]
+    fn tables_have_their_decimals() {
+        let (tree, embedding) = sample();
+        let nodes = embedding.nodes_tsv(&tree);
+        assert!(nodes.contains("\n1\t0\t0.3333\t0.0000\t0.0000\t1.0000\t0.3333\t-0.0001\t0\t0\t"), "{nodes}");
+        let compare = MethodRow::to_tsv(&embedding.methods);
+        assert!(compare.contains("\nradial\t0\t2\t0.300000\t"), "{compare}");
+    }
+}

@@ -1,0 +1,106 @@
+//! How a particle moves: equation 5.
+//!
+//! **Input** a particle's ratios P and velocity U, its own best P_ig, the best of all P_g. **Output** its next P.
+//! **Steps** `uniform`: P ← P + ω_g (P_g − P) + ω_p (P_ig − P) + ω_inert (U + γ), as printed.
+//! `subtree`, ours: 1. back to P_ig by ω_p; 2. P_g by ω_g in one random subtree, or everywhere but there; 3. in a
+//! random subtree, segment or piece of a segment, towards the targets by a share of ω_0 · 2, with some of
+//! ω_inert (U + γ). So what one part of the tree has found can be tried alone: a crossing elsewhere no longer
+//! spoils it.
+//! Why not Eq. 5 alone? It steps in all ratios at once, and with hundreds of them nearly every step crosses: on a
+//! vessel phantom of 1076 nodes 512 particles found nothing better than their start in 60 iterations (energy 74.7),
+//! this way 58.3.
+//! **Guarantees** ratios stay in their ranges. **Source** [Hu2022] Eq. 5.
+
+use std::ops::Range;
+
+use espalier_geom::random::Stream;
+
+use crate::batch::DofMap;
+use crate::layout::start::segments_below;
+use crate::params::{Params, Pull};
+use crate::problem::Problem;
+
+/// How a particle moves.
+pub(crate) struct Rule<'a> {
+    pub(crate) problem: &'a Problem<'a>,
+    pub(crate) dofs: &'a DofMap,
+    pub(crate) params: &'a Params,
+}
+
+impl Rule<'_> {
+    /// Moves one particle.
+    pub(crate) fn step(&self, p: &mut [f64], u: &[f64], bests: (&[f64], &[f64]), stream: &mut Stream) {
+        match self.params.pull {
+            Pull::Uniform => self.everywhere(p, u, bests, stream),
+            Pull::Subtree => self.in_subtrees(p, u, bests, stream),
+        }
+    }
+
+    /// Eq. 5 as printed.
+    fn everywhere(&self, p: &mut [f64], u: &[f64], (own, global): (&[f64], &[f64]), stream: &mut Stream) {
+        let Params { omega_g, omega_p, omega_inertia, .. } = *self.params;
+        for dim in 0..p.len() {
+            let gamma = stream.uniform(-1.0, 1.0);
+            let (low, high) = self.dofs.range(dim);
+            p[dim] = (omega_g * (global[dim] - p[dim])
+                + omega_p * (own[dim] - p[dim])
+                + omega_inertia * (u[dim] + gamma)
+                + p[dim])
+                .clamp(low, high);
+        }
+    }
+
+    /// Eq. 5 one part of the tree at a time, and the pull to the targets.
+    fn in_subtrees(&self, p: &mut [f64], u: &[f64], (own, global): (&[f64], &[f64]), stream: &mut Stream) {
+        let Params { omega_g, omega_p, omega_inertia, omega_target, .. } = *self.params;
+        for dim in 0..p.len() {
+            p[dim] += omega_p * (own[dim] - p[dim]);
+        }
+        // Take the best of all in one subtree, or everywhere else.
+        let taken = self.draw_subtree(stream);
+        let n_segments = self.dofs.n_lengths;
+        let parts = if stream.unit() < 0.5 { [0..0, taken] } else { [0..taken.start, taken.end..n_segments] };
+        for dim in parts.into_iter().flat_map(|segments| self.ratios_of(segments)).flatten() {
+            p[dim] += omega_g * (global[dim] - p[dim]);
+        }
+        // In another, or in a piece of a segment, go towards the targets, with a random step beside.
+        let share = omega_target * 2.0 * stream.unit();
+        let width = omega_inertia * stream.unit() * stream.unit();
+        for dim in self.draw_move(stream).into_iter().flatten() {
+            let (low, high) = self.dofs.range(dim);
+            let gamma = stream.uniform(-1.0, 1.0);
+            p[dim] = (p[dim] * (1.0 - share) + width * (u[dim] + gamma)).clamp(low, high);
+        }
+    }
+
+    /// One random subtree, as a range of segments; three times out of four a single segment.
+    fn draw_subtree(&self, stream: &mut Stream) -> Range<usize> {
+        let top = stream.below(self.dofs.n_lengths as u32) as usize;
+        if stream.unit() < 0.75 { top..top + 1 } else { segments_below(self.problem, top) }
+    }
+
+    /// The ratios of a subtree, of a segment, or of a piece of a segment: lengths, then angles.
+    fn draw_move(&self, stream: &mut Stream) -> [Range<usize>; 2] {
+        let segments = self.draw_subtree(stream);
+        let is_segment = segments.len() == 1;
+        let [lengths, angles] = self.ratios_of(segments);
+        let is_piece = is_segment && angles.len() > 1 && stream.unit() < 0.7;
+        if !is_piece {
+            return [lengths, angles];
+        }
+        let mut ends = [0, 0].map(|_: u32| angles.start + stream.below(angles.len() as u32) as usize);
+        ends.sort_unstable();
+        [0..0, ends[0]..ends[1] + 1]
+    }
+
+    /// The length ratios and the angle ratios of a range of segments.
+    fn ratios_of(&self, segments: Range<usize>) -> [Range<usize>; 2] {
+        if segments.is_empty() {
+            return [0..0, 0..0];
+        }
+        let list = self.problem.branches.list();
+        let first = self.dofs.angle[list[segments.start].nodes.start] as usize;
+        let last = self.dofs.angle[list[segments.end - 1].end()] as usize;
+        [segments, first..last + 1]
+    }
+}
