@@ -35,22 +35,38 @@ fn pulmonary_ct() {
         set("volume.seed_voxel", "[58, 80, 85]"),
         set("tree.root", "superior"),
     ];
-    check("volumes/totalseg_pulmonary_ct.nii.gz", &region_growing, &Expected { tips: 15..=60, length_mm: 400.0..=1500.0 });
+    check(
+        "volumes/totalseg_pulmonary_ct.nii.gz",
+        &region_growing,
+        &Expected { tips: 15..=60, length_mm: 400.0..=1500.0 },
+    );
 }
 
 #[test]
 fn bronchi() {
-    check("volumes/exact09_case18_bronchi.nii.gz", &[], &Expected { tips: 20..=60, length_mm: 700.0..=2500.0 });
+    check(
+        "volumes/exact09_case18_bronchi.nii.gz",
+        &[],
+        &Expected { tips: 20..=60, length_mm: 700.0..=2500.0 },
+    );
 }
 
 #[test]
 fn thick_slice_hepatic_vein() {
-    check("volumes/medmpd_liver3_hepatic_vein.nii.gz", &[], &Expected { tips: 10..=120, length_mm: 300.0..=4000.0 });
+    check(
+        "volumes/medmpd_liver3_hepatic_vein.nii.gz",
+        &[],
+        &Expected { tips: 10..=120, length_mm: 300.0..=4000.0 },
+    );
 }
 
 #[test]
 fn aorta() {
-    check("volumes/vmtk_aorta_levelset_mask.nii.gz", &[], &Expected { tips: 2..=3, length_mm: 100.0..=500.0 });
+    check(
+        "volumes/vmtk_aorta_levelset_mask.nii.gz",
+        &[],
+        &Expected { tips: 2..=3, length_mm: 100.0..=500.0 },
+    );
 }
 
 #[test]
@@ -61,6 +77,11 @@ fn olfactory_fibre_in_pixels_and_slices() {
 
 #[test]
 fn hemibrain_neuron() {
-    let voxels = [set("input.unit", "nm"), set("input.scale", "[8.0, 8.0, 8.0]"), set("embed.particles", 8), set("embed.iterations", 1)];
+    let voxels = [
+        set("input.unit", "nm"),
+        set("input.scale", "[8.0, 8.0, 8.0]"),
+        set("embed.particles", 8),
+        set("embed.iterations", 1),
+    ];
     check("neurons/hemibrain_722817260.swc", &voxels, &Expected { tips: 300..=3000, length_mm: 0.5..=20.0 });
 }

@@ -21,7 +21,9 @@ fn threads_and_folders_do_not_matter() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let config = pipelines().join("airway.toml");
     let digests: Vec<String> = [("one", 1), ("two", 2), ("three", 3)]
-        .map(|(name, threads)| run(&config, &folder.path().join(name), &quick(), threads).expect("a run").digest)
+        .map(|(name, threads)| {
+            run(&config, &folder.path().join(name), &quick(), threads).expect("a run").digest
+        })
         .into();
     assert_eq!(digests[0], digests[1]);
     assert_eq!(digests[0], digests[2]);
@@ -32,7 +34,15 @@ fn a_run_from_the_middle_equals_one_from_the_start() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let config = pipelines().join("airway.toml");
     let whole = run(&config, folder.path(), &quick(), 2).expect("a run").digest;
-    for from in [Stage::Volume, Stage::Skeleton, Stage::Radius, Stage::Tree, Stage::Views, Stage::Embed, Stage::Render] {
+    for from in [
+        Stage::Volume,
+        Stage::Skeleton,
+        Stage::Radius,
+        Stage::Tree,
+        Stage::Views,
+        Stage::Embed,
+        Stage::Render,
+    ] {
         let again = run_from(&config, folder.path(), &quick(), from).expect("a run");
         assert_eq!(again.digest, whole, "from {from}");
     }
@@ -58,7 +68,8 @@ fn an_altered_file_is_noticed_and_later_results_go_with_their_cause() {
     let tree_file = folder.path().join("tree.swc");
     let text = std::fs::read_to_string(&tree_file).expect("tree");
     std::fs::write(&tree_file, text.replace(" 1\n", " 1 \n")).expect("write");
-    let refusal = run_from(&config, folder.path(), &small_swarm(), Stage::Views).expect_err("an altered tree");
+    let refusal =
+        run_from(&config, folder.path(), &small_swarm(), Stage::Views).expect_err("an altered tree");
     assert!(refusal.to_string().contains("tree.swc"), "{refusal}");
 
     // Again from the tree stage on, with another tree: what came from the old one must not stay.

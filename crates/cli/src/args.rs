@@ -157,6 +157,8 @@ mod tests {
         assert_eq!(parse_size("4G"), Ok(4 << 30));
         assert_eq!(parse_size("800mb"), Ok(800 << 20));
         assert_eq!(parse_size("17"), Ok(17));
-        assert!(parse_size("0").is_err() && parse_size("many").is_err() && parse_size("99999999999T").is_err());
+        assert!(
+            parse_size("0").is_err() && parse_size("many").is_err() && parse_size("99999999999T").is_err()
+        );
     }
 }

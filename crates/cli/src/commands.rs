@@ -97,7 +97,12 @@ fn stage_files(stage: Stage, inputs: &[PathBuf]) -> anyhow::Result<BTreeMap<Arti
     let wanted = if is_traced { &[Artifact::Traced] } else { stage.reads() };
     if wanted.len() != inputs.len() {
         let names: Vec<&str> = wanted.iter().map(|artifact| artifact.what()).collect();
-        return Err(anyhow!("{stage} takes {} files ({}), not {}", wanted.len(), names.join(", "), inputs.len()));
+        return Err(anyhow!(
+            "{stage} takes {} files ({}), not {}",
+            wanted.len(),
+            names.join(", "),
+            inputs.len()
+        ));
     }
     Ok(wanted.iter().copied().zip(inputs.iter().cloned()).collect())
 }
@@ -123,8 +128,8 @@ fn perform(arguments: &Arguments, request: &Request) -> anyhow::Result<Summary> 
 /// A config file, or an input with every setting at its default.
 fn load(path: &Path, overrides: &[Override]) -> anyhow::Result<Loaded> {
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| Error::Read { path: path.to_owned(), source })?;
+        let text =
+            std::fs::read_to_string(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
         let config = Config::parse(&text, path, overrides).map_err(Error::from)?;
         let base_dir = path.parent().unwrap_or(Path::new("")).to_owned();
         return Ok(Loaded { config, base_dir });

@@ -1,9 +1,10 @@
 //! Progress on standard error: a bar on a terminal, one line a stage everywhere.
 
 use std::io::{IsTerminal, Write};
+use std::path::Path;
 use std::sync::Mutex;
 
-use espalier_pipeline::Event;
+use espalier_pipeline::{Event, Stage};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Prints a line to standard error. A closed standard error is no reason to stop.
@@ -29,7 +30,9 @@ impl Progress {
     }
 
     pub(crate) fn show(&self, event: Event) {
-        if self.is_quiet {
+        if let (true, Event::Started { .. } | Event::Progress { .. } | Event::Finished { .. }) =
+            (self.is_quiet, &event)
+        {
             return;
         }
         // A panic while the lock was held ends the process, so the lock is never poisoned for anyone.
@@ -58,9 +61,22 @@ impl Progress {
                 finish(&mut bar);
                 line(&format!("{stage:<9}{seconds:>6.1} s  {text}"));
             }
+            Event::Stopped { kept, out } => {
+                finish(&mut bar);
+                line(&what_is_kept(&kept, &out));
+            }
             _ => {}
         }
     }
+}
+
+/// What a run that failed has left.
+fn what_is_kept(kept: &[Stage], out: &Path) -> String {
+    if kept.is_empty() {
+        return "stopped: nothing was written".to_owned();
+    }
+    let names: Vec<&str> = kept.iter().map(|stage| stage.name()).collect();
+    format!("stopped: {} holds the results of {}", out.display(), names.join(", "))
 }
 
 fn finish(bar: &mut Option<ProgressBar>) {
@@ -70,5 +86,6 @@ fn finish(bar: &mut Option<ProgressBar>) {
 }
 
 fn bar_style() -> ProgressStyle {
-    ProgressStyle::with_template("{wide_bar} {percent:>3} %  {msg}").unwrap_or_else(|_| ProgressStyle::default_bar())
+    ProgressStyle::with_template("{wide_bar} {percent:>3} %  {msg}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar())
 }

@@ -99,7 +99,8 @@ impl Artifacts {
 
     pub(crate) fn spheres(&mut self, lookup: Lookup<'_>) -> Result<Arc<InscribedSpheres>, Error> {
         let spheres = self.spheres.clone();
-        let spheres = self.parsed(spheres, Artifact::Spheres, lookup, |text| InscribedSpheres::from_tsv(text))?;
+        let spheres =
+            self.parsed(spheres, Artifact::Spheres, lookup, |text| InscribedSpheres::from_tsv(text))?;
         self.spheres = Some(Arc::clone(&spheres));
         Ok(spheres)
     }
@@ -114,7 +115,8 @@ impl Artifacts {
     pub(crate) fn views(&mut self, lookup: Lookup<'_>) -> Result<Arc<ViewHierarchy>, Error> {
         let tree = self.tree(lookup)?;
         let views = self.views.clone();
-        let views = self.parsed(views, Artifact::Views, lookup, |text| ViewHierarchy::from_json(text, &tree))?;
+        let views =
+            self.parsed(views, Artifact::Views, lookup, |text| ViewHierarchy::from_json(text, &tree))?;
         self.views = Some(Arc::clone(&views));
         Ok(views)
     }

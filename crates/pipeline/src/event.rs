@@ -1,5 +1,7 @@
 //! What a run tells its caller while it goes on.
 
+use std::path::PathBuf;
+
 use crate::stage::Stage;
 
 /// Something that happened in a run.
@@ -39,5 +41,12 @@ pub enum Event {
         seconds: f64,
         /// What it did, as a phrase.
         line: String,
+    },
+    /// The run stops with an error.
+    Stopped {
+        /// The stages whose results are in place.
+        kept: Vec<Stage>,
+        /// The run folder.
+        out: PathBuf,
     },
 }

@@ -20,6 +20,8 @@ pub(crate) struct RunFolder {
     digests: BTreeMap<String, String>,
     /// What it said when the folder was opened.
     former_digests: BTreeMap<String, String>,
+    /// Whether this run made the folder.
+    is_new: bool,
     /// The system releases the lock with the handle, however the process ends.
     _lock: File,
 }
@@ -28,6 +30,7 @@ impl RunFolder {
     /// Opens or makes the folder and takes its lock.
     pub(crate) fn open(path: &Path) -> Result<Self, Error> {
         let create = |source| Error::Create { path: path.to_owned(), source };
+        let is_new = !path.exists();
         fs::create_dir_all(path).map_err(create)?;
         let lock = File::create(path.join(LOCK_FILE)).map_err(create)?;
         match lock.try_lock() {
@@ -38,7 +41,16 @@ impl RunFolder {
             Err(TryLockError::Error(source)) => return Err(create(source)),
         }
         let digests = read_digests(&path.join(DIGEST_FILE));
-        Ok(Self { path: path.to_owned(), former_digests: digests.clone(), digests, _lock: lock })
+        Ok(Self { path: path.to_owned(), former_digests: digests.clone(), digests, is_new, _lock: lock })
+    }
+
+    /// Removes the folder if this run made it and has put nothing into it.
+    pub(crate) fn remove_if_unused(&self) {
+        if self.is_new && self.digests.is_empty() {
+            // Only an empty folder can be removed, so nothing is lost where this fails.
+            let _ = fs::remove_file(self.path.join(LOCK_FILE));
+            let _ = fs::remove_dir(&self.path);
+        }
     }
 
     pub(crate) fn path(&self) -> &Path {
@@ -67,7 +79,8 @@ impl RunFolder {
         let parent = path.parent().unwrap_or(&self.path);
         fs::create_dir_all(parent).map_err(|source| Error::Create { path: parent.to_owned(), source })?;
         let write = |source| Error::Write { path: path.clone(), source };
-        let mut file = AtomicWriteFile::open(&path).map_err(|source| Error::Create { path: path.clone(), source })?;
+        let mut file =
+            AtomicWriteFile::open(&path).map_err(|source| Error::Create { path: path.clone(), source })?;
         file.write_all(bytes).map_err(write)?;
         file.commit().map_err(write)
     }

@@ -73,23 +73,28 @@ fn run_stages(request: &Request, events: &(dyn Fn(Event) + Sync)) -> Result<Summ
     }
 
     let mut folder = RunFolder::open(&request.out)?;
-    provenance::write_config(&mut folder, config)?;
-    if stages.first().is_some_and(|first| request.from.is_none() || first.reads().is_empty()) {
-        provenance::write_inputs(&mut folder, input.as_deref())?;
-    }
     let mut costs = Vec::new();
     let mut has_changed = false;
     for &stage in &stages {
         events(Event::Started { stage });
         let watch = Stopwatch::start();
-        let outcome = steps::perform(&mut Step {
-            stage,
-            config,
-            source: &source,
-            artifacts: &mut artifacts,
-            events,
-            folder: &folder,
-        })?;
+        let mut step =
+            Step { stage, config, source: &source, artifacts: &mut artifacts, events, folder: &folder };
+        let outcome = match steps::perform(&mut step) {
+            Ok(outcome) => outcome,
+            Err(error) => {
+                let kept = costs.iter().map(|cost: &StageCost| cost.stage).collect();
+                folder.remove_if_unused();
+                events(Event::Stopped { kept, out: request.out.clone() });
+                return Err(error);
+            }
+        };
+        if costs.is_empty() {
+            provenance::write_config(&mut folder, config)?;
+            if request.from.is_none_or(|from| from == stages_of(&source)[0]) {
+                provenance::write_inputs(&mut folder, input.as_deref())?;
+            }
+        }
         has_changed |= write_outcome(&mut folder, stage, &outcome)?;
         for warning in &outcome.report.warnings {
             events(Event::Warning { stage, code: warning.code, message: warning.message.clone() });
@@ -141,10 +146,10 @@ fn remove_outdated(folder: &mut RunFolder, last_done: Option<Stage>) -> Result<(
 
 fn resolve_source(request: &Request) -> Result<Source, Error> {
     let Loaded { config, base_dir } = &request.loaded;
-    config.input.resolve(base_dir, request.data_dir.as_deref()).map_err(|error| Error::Stage {
-        stage: Stage::Phantom,
-        cause: Box::new(error),
-    })
+    config
+        .input
+        .resolve(base_dir, request.data_dir.as_deref())
+        .map_err(|error| Error::Stage { stage: Stage::Phantom, cause: Box::new(error) })
 }
 
 /// The stages that a run from this source passes through.

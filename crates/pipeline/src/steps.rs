@@ -68,15 +68,14 @@ fn phantom(step: &mut Step<'_>) -> Result<Outcome, Error> {
             let scan = espalier_phantom::ct(&made, params, *seed).map_err(failed)?;
             report.count_usize("nodes", made.tree.n_nodes());
             report.count_usize("voxels", scan.grid().n_voxels());
-            let line = format!("{}: {} tips, {}", kind.name(), made.tree.n_tips(), describe_grid(scan.grid()));
+            let line =
+                format!("{}: {} tips, {}", kind.name(), made.tree.n_tips(), describe_grid(scan.grid()));
             let files = phantom_files(&made, &scan)?;
             let files = files.into_iter().map(|(name, bytes)| step.beside(name, bytes)).collect();
             Ok(Outcome { files, report, line })
         }
         // A run from a file has no phantom stage.
-        Source::Volume(_) | Source::Tree(_) => {
-            Ok(Outcome { files: Vec::new(), report, line: String::new() })
-        }
+        Source::Volume(_) | Source::Tree(_) => Ok(Outcome { files: Vec::new(), report, line: String::new() }),
     }
 }
 
@@ -84,7 +83,8 @@ fn phantom(step: &mut Step<'_>) -> Result<Outcome, Error> {
 pub(crate) fn phantom_files(made: &Phantom, scan: &Volume) -> Result<Vec<(&'static str, Vec<u8>)>, Error> {
     let failed = |error| Error::stage(Stage::Phantom)(boxed(error));
     let truth = swc::write(&made.tree, &[("phantom", made.kind.name())]);
-    let mut files = vec![("ct.nii.gz", nifti_out::volume(scan).map_err(failed)?), ("truth.swc", truth.into_bytes())];
+    let mut files =
+        vec![("ct.nii.gz", nifti_out::volume(scan).map_err(failed)?), ("truth.swc", truth.into_bytes())];
     if let Some(mask) = &made.mask {
         files.push(("truth-mask.nii.gz", nifti_out::mask(mask).map_err(failed)?));
     }
@@ -130,11 +130,8 @@ fn radius(step: &mut Step<'_>) -> Result<Outcome, Error> {
         .map_err(|error| step.failed(error))?;
     let spheres = measured.spheres;
     let radii = || spheres.0.iter().map(|sphere| sphere.radius_mm);
-    let line = format!(
-        "{:.2} to {:.2} mm",
-        radii().fold(f64::INFINITY, f64::min),
-        radii().fold(0.0, f64::max)
-    );
+    let line =
+        format!("{:.2} to {:.2} mm", radii().fold(f64::INFINITY, f64::min), radii().fold(0.0, f64::max));
     let mut field = vec![0.0_f32; mask.grid().n_voxels()];
     for (voxel, sphere) in skeleton.voxels().iter().zip(&spheres.0) {
         field[mask.grid().index(voxel.map(|coordinate| coordinate as usize))] = sphere.radius_mm as f32;
@@ -204,9 +201,8 @@ fn embed(step: &mut Step<'_>) -> Result<Outcome, Error> {
         let note = format!("energy {:.4}, crossings {}", p.energy, p.crossings);
         events(Event::Progress { stage, done: p.done, total: p.total, note });
     };
-    let embedded =
-        espalier_embed::embed(&tree, &views, &step.config.embed, step.config.seed, &progress)
-            .map_err(|error| step.failed(error))?;
+    let embedded = espalier_embed::embed(&tree, &views, &step.config.embed, step.config.seed, &progress)
+        .map_err(|error| step.failed(error))?;
     let json = embedded.embedding.to_json();
     let embedding = step.read_back(&json, |text| Embedding::from_json(text, &tree))?;
     let line = embedding_phrase(&embedding);
@@ -226,7 +222,8 @@ fn render(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let embedding = step.take(Artifacts::embedding)?;
     let mut params = step.config.render.clone();
     params.title.get_or_insert_with(|| step.config.name.clone());
-    let made = espalier_render::render(&tree, &embedding, &views, &params).map_err(|error| step.failed(error))?;
+    let made =
+        espalier_render::render(&tree, &embedding, &views, &params).map_err(|error| step.failed(error))?;
     let mut files = vec![
         ("planar.png".to_owned(), made.png),
         ("planar.svg".to_owned(), made.svg.into_bytes()),
@@ -241,7 +238,10 @@ fn render(step: &mut Step<'_>) -> Result<Outcome, Error> {
 
 impl<'a> Step<'a> {
     /// An artifact, from memory or from its file.
-    fn take<T>(&mut self, artifact: impl FnOnce(&mut Artifacts, Lookup<'a>) -> Result<T, Error>) -> Result<T, Error> {
+    fn take<T>(
+        &mut self,
+        artifact: impl FnOnce(&mut Artifacts, Lookup<'a>) -> Result<T, Error>,
+    ) -> Result<T, Error> {
         let lookup = Lookup { folder: self.folder, stage: self.stage };
         artifact(self.artifacts, lookup)
     }

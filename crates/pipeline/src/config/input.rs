@@ -122,7 +122,11 @@ impl Input {
         )?;
         ParamError::check("path", !(has_path && self.phantom.is_some()), "set path or phantom, not both")?;
         let is_scale = |scale: f64| scale.is_finite() && (1e-9..=1e9).contains(&scale);
-        ParamError::check("scale", self.scale.into_iter().all(is_scale), "must be three numbers in 1e-9..=1e9")?;
+        ParamError::check(
+            "scale",
+            self.scale.into_iter().all(is_scale),
+            "must be three numbers in 1e-9..=1e9",
+        )?;
         ParamError::check(
             "radius_scale",
             is_scale(self.radius_scale),
@@ -134,7 +138,10 @@ impl Input {
     #[must_use]
     pub fn traced_scale(&self) -> SwcScale {
         let unit_mm = self.unit.mm();
-        SwcScale { position_mm: DVec3::from_array(self.scale) * unit_mm, radius_mm: self.radius_scale * unit_mm }
+        SwcScale {
+            position_mm: DVec3::from_array(self.scale) * unit_mm,
+            radius_mm: self.radius_scale * unit_mm,
+        }
     }
 
     /// The input's place, for a config in `base_dir` and data in `data_dir`.

@@ -154,8 +154,12 @@ impl Config {
             .map_err(at(None))?;
         ParamError::check("name", is_folder_name(&self.name), "must be letters, digits, '-', '_' or '.'")
             .map_err(at(None))?;
-        ParamError::check("seed", i64::try_from(self.seed).is_ok(), "must be below 2^63, the largest TOML integer")
-            .map_err(at(None))?;
+        ParamError::check(
+            "seed",
+            i64::try_from(self.seed).is_ok(),
+            "must be below 2^63, the largest TOML integer",
+        )
+        .map_err(at(None))?;
         self.input.validate().map_err(|error| source.value_error("input", &error))?;
         self.phantom.validate().map_err(at(Some(Stage::Phantom)))?;
         self.volume.validate().map_err(at(Some(Stage::Volume)))?;

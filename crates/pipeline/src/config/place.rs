@@ -53,9 +53,8 @@ impl SourceText<'_> {
             return Box::new(ConfigError { rendered: format!("{path}: {title}"), hint });
         };
         let line = self.text[..span.start].matches('\n').count() + 1;
-        let snippet = Snippet::source(self.text)
-            .path(path.as_str())
-            .annotation(AnnotationKind::Primary.span(span));
+        let snippet =
+            Snippet::source(self.text).path(path.as_str()).annotation(AnnotationKind::Primary.span(span));
         let picture = Renderer::plain().render(&[Level::ERROR.primary_title(title).element(snippet)]);
         let picture = picture.split_once('\n').map_or("", |(_, rest)| rest);
         Box::new(ConfigError { rendered: format!("{path}:{line}: {title}\n{picture}"), hint })
@@ -126,7 +125,10 @@ fn suggestion(message: &str) -> String {
         .min()
         .filter(|(distance, _)| *distance <= MAX_EDIT_DISTANCE);
     let legal = legal.join(", ");
-    nearest.map_or_else(|| format!("legal here: {legal}"), |(_, name)| format!("did you mean {name}? legal here: {legal}"))
+    nearest.map_or_else(
+        || format!("legal here: {legal}"),
+        |(_, name)| format!("did you mean {name}? legal here: {legal}"),
+    )
 }
 
 fn first_line(message: &str) -> &str {
