@@ -15,6 +15,19 @@
 //!
 //! Whatever is cut, pruned, dropped, extended or merged stands in the ledger with place, radius, length and reason.
 //!
+//! ```
+//! use espalier_model::swc::{Traced, TracedNode};
+//! use espalier_tree::{Params, Roots, from_traced};
+//! let node = |id, x, parent| TracedNode {
+//!     id, kind: 0, position_mm: glam::DVec3::new(x, 0.0, 0.0), radius_mm: 1.0, parent, line: id as usize,
+//! };
+//! let traced = Traced { nodes: vec![node(1, 0.0, None), node(2, 5.0, Some(0)), node(3, 9.0, None)] };
+//! let built = from_traced(&traced, &Params::default())?;
+//! assert_eq!((built.tree.n_nodes(), built.ledger.0.len()), (2, 1));
+//! assert!(from_traced(&traced, &Params { roots: Roots::Refuse, ..Params::default() }).is_err());
+//! # Ok::<(), espalier_tree::Error>(())
+//! ```
+//!
 //! **Guarantees** same input and parameters, same tree; no recursion; ties go to the lower index, hence to storage order.
 
 mod adjacency;
@@ -39,13 +52,13 @@ mod traced;
 mod union_find;
 
 use espalier_model::swc::Traced;
-use espalier_model::{InscribedSpheres, Ledger, Mask, Node, Report, Skeleton, Tree};
+use espalier_model::{InscribedSpheres, Ledger, LedgerEntry, LedgerKind, Mask, Node, Report, Skeleton, Tree};
 use glam::DVec3;
 
 pub use error::Error;
 pub use params::{Components, Loops, MissingRadii, Params, Resample, Root, Roots, Tips};
 
-/// Edges shorter than this share of the smallest spacing are no shape of the organ.
+/// Branches shorter than this share of the smallest spacing are shorter than voxels can tell.
 const RESOLUTION: f64 = 0.2;
 
 /// A tree, what was done to get it, and its figures.
@@ -99,9 +112,8 @@ pub fn build(
     smooth::space_evenly(&mut outline, mask.grid());
     smooth::smooth(&mut outline, mask.grid(), params.smooth_voxels);
 
-    // Two forks nearer to each other than voxels can tell are one.
     let resolution_mm = RESOLUTION * mask.grid().spacing_mm().min_element();
-    let nodes = merge::merge_near(&outline_nodes(&outline), resolution_mm, &mut ledger);
+    let nodes = merge::merge_near(&outline_nodes(&outline, resolution_mm, &mut ledger), &mut ledger);
     let kind = if params.resample == Resample::Auto { Resample::Shape } else { params.resample };
     finish(&nodes, kind, params, ledger, report)
 }
@@ -144,8 +156,9 @@ fn check_input(mask: &Mask, skeleton: &Skeleton, spheres: &InscribedSpheres) -> 
     Ok(())
 }
 
-/// The nodes of an outline, parents first, as dense as its samples.
-fn outline_nodes(outline: &outline::Outline) -> Vec<Node> {
+/// The nodes of an outline, parents first, as dense as its samples; forks nearer to each other than
+/// `resolution_mm` are one.
+fn outline_nodes(outline: &outline::Outline, resolution_mm: f64, ledger: &mut Ledger) -> Vec<Node> {
     let node = |sample: graph::Sample, parent: Option<usize>| Node {
         position_mm: sample.position_mm,
         radius_mm: sample.radius_mm,
@@ -156,9 +169,21 @@ fn outline_nodes(outline: &outline::Outline) -> Vec<Node> {
     let mut node_of_hub = vec![0; outline.hubs.len()];
     for line in &outline.lines {
         let mut parent = node_of_hub[line.from];
-        for &sample in &line.samples[1..] {
-            nodes.push(node(sample, Some(parent)));
-            parent = nodes.len() - 1;
+        let length_mm = graph::polyline_length_mm(&line.samples);
+        if length_mm <= resolution_mm && outline.lines.len() > 1 {
+            let end = outline.hubs[line.to].sample;
+            ledger.0.push(LedgerEntry {
+                kind: LedgerKind::NodesMerged,
+                position_mm: end.position_mm,
+                radius_mm: end.radius_mm,
+                length_mm,
+                reason: format!("branch of {length_mm:.3e} mm, not longer than {resolution_mm:.3e} mm"),
+            });
+        } else {
+            for &sample in &line.samples[1..] {
+                nodes.push(node(sample, Some(parent)));
+                parent = nodes.len() - 1;
+            }
         }
         node_of_hub[line.to] = parent;
     }

@@ -10,12 +10,12 @@ use glam::DVec3;
 /// Edges shorter than this share of the tree's extent have no direction worth keeping.
 const SHARE_OF_EXTENT: f64 = 1e-6;
 
-/// Collapses all edges not longer than `resolution_mm` or 1e-6 of the extent. Nodes that no root leads to are dropped;
-/// there are none in what the callers give.
-pub(crate) fn merge_near(nodes: &[Node], resolution_mm: f64, ledger: &mut Ledger) -> Vec<Node> {
+/// Collapses all edges not longer than 1e-6 of the extent. Nodes that no root leads to are dropped; there are none in
+/// what the callers give.
+pub(crate) fn merge_near(nodes: &[Node], ledger: &mut Ledger) -> Vec<Node> {
     let low = nodes.iter().fold(DVec3::INFINITY, |low, node| low.min(node.position_mm));
     let high = nodes.iter().fold(DVec3::NEG_INFINITY, |high, node| high.max(node.position_mm));
-    let tolerance_mm = (SHARE_OF_EXTENT * 0.5 * (high - low).length()).max(resolution_mm);
+    let tolerance_mm = SHARE_OF_EXTENT * 0.5 * (high - low).length();
 
     let mut merged: Vec<Node> = Vec::with_capacity(nodes.len());
     let mut new_index = vec![usize::MAX; nodes.len()];

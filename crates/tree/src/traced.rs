@@ -45,7 +45,7 @@ pub(crate) fn single_tree(
         }
         (_, policy) => resolve_roots(traced, &nodes, policy, ledger),
     };
-    let mut nodes = merge_near(&nodes, 0.0, ledger);
+    let mut nodes = merge_near(&nodes, ledger);
     if params.missing_radii == MissingRadii::Neighbours {
         repair_radii(&mut nodes, ledger);
     }
