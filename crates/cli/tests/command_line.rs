@@ -171,7 +171,9 @@ fn stages_on_their_own_equal_a_run() {
         String::from_utf8_lossy(&output.stdout).into_owned()
     };
     run(&["phantom", "y", "-o", "y"]);
-    let swarm = ["--set", "embed.particles=16", "--set", "embed.iterations=4", "--set", "name=y"];
+    let quick = "render.width_px=300";
+    let swarm =
+        ["--set", "embed.particles=16", "--set", "embed.iterations=4", "--set", "name=y", "--set", quick];
     let with_swarm = |arguments: &[&str]| run(&[arguments, &swarm].concat());
     let first = with_swarm(&["run", "y/truth-mask.nii.gz", "-o", "whole"]);
     with_swarm(&["volume", "y/truth-mask.nii.gz", "-o", "pieces"]);
