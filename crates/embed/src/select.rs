@@ -57,7 +57,7 @@ struct Judged {
     certificate: Certificate,
     scored: Scored,
     losses: Losses,
-    overlaps: usize,
+    overlaps: overlap::Overlaps,
     evaluations: u64,
     trace: Vec<TracePoint>,
 }
@@ -153,7 +153,7 @@ fn row(judged: &Judged, targets: TargetKind) -> MethodRow {
     MethodRow {
         method: judged.name.clone(),
         crossings: judged.certificate.crossings,
-        overlaps: judged.overlaps,
+        overlaps: judged.overlaps.count,
         energy: judged.scored.energy,
         losses: judged.losses,
         evaluations: judged.evaluations,
@@ -166,11 +166,20 @@ fn report(problem: &Problem, judged: &[Judged], winner: &Judged, asked: Method) 
     report.count_usize("nodes", problem.n_nodes());
     report.count_usize("branches", problem.branches.list().len());
     report.count_usize("crossings", winner.certificate.crossings);
-    report.count_usize("overlaps", winner.overlaps);
+    report.count_usize("overlaps", winner.overlaps.count);
     report.count("energy", winner.scored.energy.total());
     report.count("length_loss_mean", winner.losses.length_loss_mean);
     report.count("angle3d_error_mean_deg", winner.losses.angle3d_error_mean_deg);
     report.count("evaluations", judged.iter().map(|judged| judged.evaluations as f64).sum::<f64>());
+    if !winner.overlaps.is_complete {
+        let message = format!(
+            "the mean radius is {} mm, the median edge {} mm: too many tubes overlap to count them all; check the \
+             unit of the radii",
+            problem.tree.mean_radius_mm(),
+            problem.scale_mm
+        );
+        report.warn("W-EMBED-THICK-TUBES", message);
+    }
     if winner.method != asked {
         let reason = match judged.iter().find(|judged| judged.method == asked) {
             Some(judged) if judged.certificate.holds() => {

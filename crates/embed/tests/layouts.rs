@@ -273,3 +273,15 @@ fn params_read_and_write() {
     Params::paper().validate().expect("the paper's values are legal");
     assert_eq!(Params::paper().targets, TargetMode::Projected);
 }
+
+#[test]
+fn absurd_radii_cost_no_more_than_their_limit() {
+    let mut nodes = random_tree(7, 7000, 0.0, false, 4).nodes().to_vec();
+    for node in &mut nodes {
+        node.radius_mm = 1e4;
+    }
+    let params = Params { method: Method::Cone, methods: Vec::new(), ..small() };
+    let embedded = laid_flat(&Tree::new(&nodes).expect("a tree"), &params);
+    assert_eq!(embedded.report.warnings[0].code, "W-EMBED-THICK-TUBES");
+    assert!(embedded.report.warnings[0].message.contains("the mean radius is 10000 mm, the median edge 1"));
+}
