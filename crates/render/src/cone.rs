@@ -215,10 +215,10 @@ impl Cone {
             return (b / a).clamp(0.0, length);
         }
         let c = radius * radius - w.length_squared();
-        let under = b * b + a * c;
         let e = 1.0 - k * k;
-        let inner = if e > 0.0 && under >= 0.0 {
-            let q = (under / e).sqrt();
+        let inner = if e > 0.0 {
+            // A ray just outside the outline misses the cone: q = 0 then gives the place that it passes closest.
+            let q = ((b * b + a * c).max(0.0) / e).sqrt();
             // Two forms of the same root; the second survives A → 0, where the axis points at the viewer.
             let other = e * (b - uz * q);
             if a.abs() > 0.05 {
@@ -228,6 +228,8 @@ impl Cone {
             } else {
                 0.0
             }
+        } else if k > 0.0 {
+            length
         } else {
             0.0
         };

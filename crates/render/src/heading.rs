@@ -9,8 +9,9 @@ use crate::unit::{self, LengthUnit};
 /// The heading of the map.
 pub(crate) fn planar(tree: &Tree, branches: &Branches, embedding: &Embedding, params: &Params) -> Heading {
     let losses = &embedding.losses;
-    let verdict = vec![
-        verdict(embedding),
+    let mut verdict = vec![verdict(embedding)];
+    verdict.extend(overlaps(embedding));
+    verdict.extend([
         format!("method {}", embedding.method),
         format!(
             "length loss mean {}, max {}",
@@ -22,9 +23,9 @@ pub(crate) fn planar(tree: &Tree, branches: &Branches, embedding: &Embedding, pa
             degrees(losses.angle3d_error_mean_deg),
             degrees(losses.angle3d_error_max_deg)
         ),
-    ];
+    ]);
     let mut facts = size_of(tree, branches, params);
-    facts.push("a map, not a projection: lengths and bends are true, directions are not".to_owned());
+    facts.push("a map, not a projection: it keeps lengths and bends, not directions".to_owned());
     Heading { title: params.title.clone(), verdict, facts }
 }
 
@@ -49,9 +50,16 @@ pub(crate) fn verdict(embedding: &Embedding) -> String {
     }
 }
 
+/// How many pairs of branches overlap at their true widths, although their centrelines do not cross.
+fn overlaps(embedding: &Embedding) -> Option<String> {
+    let own = embedding.methods.iter().find(|row| row.method == embedding.method)?;
+    (own.overlaps > 0).then(|| format!("{} overlaps at true width", own.overlaps))
+}
+
 fn size_of(tree: &Tree, branches: &Branches, params: &Params) -> Vec<String> {
     let length_mm = tree.length_mm();
-    let unit = LengthUnit::choose(params.unit, length_mm);
+    // A sum of many branches: 976 µm and 4723 mm read better beside the radii than 0.976 mm and 4.723 m.
+    let unit = LengthUnit::choose(params.unit, 0.1 * length_mm);
     let counted = |n: usize, one: &str, many: &str| format!("{n} {}", if n == 1 { one } else { many });
     let mut parts = vec![
         counted(branches.list().len(), "branch", "branches"),

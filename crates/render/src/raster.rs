@@ -7,8 +7,8 @@
 //! distance to the outline of all. 3. Where several cones of one neighbourhood of the tree reach nearly as high,
 //! average their normals and colours with weights that fade to 0 with the gap in height: creases between
 //! neighbours become fillets, and a chain of collinear cones stays as it is. 4. Where a cone in front passes over
-//! a distant part of the tree, leave a gap in the paper's colour, as anatomical drawings do. 5. Shade, and average
-//! the samples by their coverage.
+//! a distant part of the tree, leave a gap in the paper's colour, as anatomical drawings do; where distant parts of
+//! the map touch, draw a seam. 5. Shade, and average the samples by their coverage.
 //! **Guarantees** the same bytes for any number of threads: a band of tiles is one task, and inside a tile cones
 //! come in preorder.
 //! **Source** section 4.1 of [Hu2022]; the blending is ours.
@@ -34,6 +34,9 @@ const FRINGE_PX: f32 = 0.5 / SAMPLES as f32;
 const BLEND_SHARE: f32 = 0.7;
 /// Two cones blend if the path between them is at most this many of their radii.
 const BLEND_REACH: f32 = 2.0;
+/// Where two distant parts of the map overlap at their widths, a dark line this wide says that they do not join.
+const SEAM_PX: f32 = 1.3;
+const SEAM: f32 = 0.55;
 /// Width of the gap beside a branch that passes in front.
 const GAP_PX: f32 = 1.6;
 /// No edge.
@@ -176,11 +179,24 @@ struct Best {
     index: u32,
     /// Distance to the outline of all cones.
     outside: f32,
+    /// How many cones reach the sample, or come so near that they may leave a gap beside it.
+    n_near: u32,
 }
 
 impl Best {
     fn nothing() -> Self {
-        Self { hit: Hit::default(), index: NOTHING, outside: f32::INFINITY }
+        Self { hit: Hit::default(), index: NOTHING, outside: f32::INFINITY, n_near: 0 }
+    }
+
+    fn offer(&mut self, index: u32, hit: Hit) {
+        self.n_near += 1;
+        if hit.outside > FRINGE_PX {
+            return;
+        }
+        if self.index == NOTHING || hit.z > self.hit.z {
+            (self.hit, self.index) = (hit, index);
+        }
+        self.outside = self.outside.min(hit.outside);
     }
 }
 
@@ -191,10 +207,18 @@ struct Blend {
     color: Rgb,
     weight: f32,
     gap: f32,
+    seam: f32,
 }
 
 impl Blend {
-    const NOTHING: Self = Self { normal: Vec3::ZERO, color: [0.0; 3], weight: 0.0, gap: 0.0 };
+    const NOTHING: Self = Self { normal: Vec3::ZERO, color: [0.0; 3], weight: 0.0, gap: 0.0, seam: 0.0 };
+
+    fn add(&mut self, job: &Job<'_>, edge: &Drawn, hit: &Hit, weight: f32) {
+        let color = job.palette.at(edge.values[0] + hit.share * (edge.values[1] - edge.values[0]));
+        self.normal += weight * edge.cone.normal(hit);
+        self.color = std::array::from_fn(|k| self.color[k] + weight * color[k]);
+        self.weight += weight;
+    }
 }
 
 /// The samples of one tile.
@@ -212,24 +236,26 @@ impl Samples {
     fn draw(&mut self, job: &Job<'_>, list: &[u32], origin: Vec2) {
         self.best.fill(Best::nothing());
         self.blend.fill(Blend::NOTHING);
-        for &index in list {
-            let edge = &job.drawn[index as usize];
-            for_each_sample(&edge.cone, origin, FRINGE_PX, |sample, hit| {
-                let best = &mut self.best[sample];
-                if best.index == NOTHING || hit.z > best.hit.z {
-                    (best.hit, best.index) = (hit, index);
-                }
-                best.outside = best.outside.min(hit.outside);
-            });
-        }
         let margin = if job.has_depth { GAP_PX } else { FRINGE_PX };
         for &index in list {
             let edge = &job.drawn[index as usize];
-            for_each_sample(&edge.cone, origin, margin, |sample, hit| {
-                let best = &self.best[sample];
-                if best.index != NOTHING {
-                    add(job, &mut self.blend[sample], best, (index, edge, hit));
-                }
+            let all = |_: usize| true;
+            for_each_sample(&edge.cone, (origin, margin), all, |sample, hit| {
+                self.best[sample].offer(index, hit);
+            });
+        }
+        // Most samples see one cone only and have nothing to blend.
+        for (best, blend) in self.best.iter().zip(&mut self.blend) {
+            if best.n_near == 1 && best.index != NOTHING {
+                blend.add(job, &job.drawn[best.index as usize], &best.hit, 1.0);
+            }
+        }
+        let best = &self.best;
+        for &index in list {
+            let edge = &job.drawn[index as usize];
+            let shared = |sample: usize| best[sample].n_near > 1 && best[sample].index != NOTHING;
+            for_each_sample(&edge.cone, (origin, margin), shared, |sample, hit| {
+                weigh(job, &mut self.blend[sample], &best[sample], (index, edge, hit));
             });
         }
     }
@@ -279,12 +305,13 @@ impl Samples {
         let normal = blend.normal.normalize_or(Vec3::Z);
         let place = Place { normal, outside_px: best.outside, radius_px: best.hit.radius };
         let lit = shade::shade(base, &place, job.colors.rim, job.style);
+        let lit = shade::mix(lit, job.colors.rim, SEAM * blend.seam);
         shade::mix(lit, job.colors.background, blend.gap)
     }
 }
 
-/// Adds a cone's say to the blending of a sample.
-fn add(job: &Job<'_>, blend: &mut Blend, best: &Best, (index, edge, hit): (u32, &Drawn, Hit)) {
+/// Adds a cone's say to the blending of a sample that several cones reach.
+fn weigh(job: &Job<'_>, blend: &mut Blend, best: &Best, (index, edge, hit): (u32, &Drawn, Hit)) {
     let winner = &job.drawn[best.index as usize];
     let arc = |edge: &Drawn, hit: &Hit| edge.arc_px[0] + hit.share * (edge.arc_px[1] - edge.arc_px[0]);
     let radii = hit.radius + best.hit.radius;
@@ -306,17 +333,25 @@ fn add(job: &Job<'_>, blend: &mut Blend, best: &Best, (index, edge, hit): (u32, 
     }
     let lower_by = (best.hit.z - hit.z) / (BLEND_SHARE * best.hit.radius).max(0.5);
     let fade = (1.0 - lower_by).max(0.0);
-    if fade > 0.0 && is_near(BLEND_REACH) {
-        let weight = if index == best.index { 1.0 } else { fade * fade };
-        let color = job.palette.at(edge.values[0] + hit.share * (edge.values[1] - edge.values[0]));
-        blend.normal += weight * edge.cone.normal(&hit);
-        blend.color = std::array::from_fn(|k| blend.color[k] + weight * color[k]);
-        blend.weight += weight;
+    if fade <= 0.0 {
+        return;
+    }
+    if is_near(BLEND_REACH) {
+        blend.add(job, edge, &hit, if index == best.index { 1.0 } else { fade * fade });
+    } else if !is_near(2.0 * BLEND_REACH) {
+        // The surfaces meet at an angle here, so the gap in height grows about as fast as the distance.
+        let lower_px = best.hit.z - hit.z;
+        blend.seam = blend.seam.max((1.0 - lower_px / SEAM_PX).max(0.0));
     }
 }
 
-/// Calls `visit` with each sample of the tile at `origin` that a cone reaches.
-fn for_each_sample(cone: &Cone, origin: Vec2, margin: f32, mut visit: impl FnMut(usize, Hit)) {
+/// Calls `visit` with each sample of the tile at `origin` that a cone reaches and that is `wanted`.
+fn for_each_sample(
+    cone: &Cone,
+    (origin, margin): (Vec2, f32),
+    wanted: impl Fn(usize) -> bool,
+    mut visit: impl FnMut(usize, Hit),
+) {
     const STEP: f32 = 1.0 / SAMPLES as f32;
     let clip = |low: f32, high: f32, from: f32| {
         let index = |at: f32| (at - from) * SAMPLES as f32 - 0.5;
@@ -330,9 +365,13 @@ fn for_each_sample(cone: &Cone, origin: Vec2, margin: f32, mut visit: impl FnMut
         let y = origin.y + (row as f32 + 0.5) * STEP;
         let Some((from, to)) = cone.span(y, margin) else { continue };
         for column in clip(from, to, origin.x) {
+            let sample = row * TILE_SAMPLES + column;
+            if !wanted(sample) {
+                continue;
+            }
             let pixel = Vec2::new(origin.x + (column as f32 + 0.5) * STEP, y);
             if let Some(hit) = cone.at(pixel, margin) {
-                visit(row * TILE_SAMPLES + column, hit);
+                visit(sample, hit);
             }
         }
     }

@@ -3,7 +3,9 @@
 //! **Input** a tree with its embedding or its global view. **Output** a point (x to the right, y up, z towards the
 //! viewer, mm) and a drawn radius for each node.
 
-use espalier_geom::math;
+use std::f64::consts::TAU;
+
+use espalier_geom::{angle, math};
 use espalier_model::{Embedding, Tree, View};
 use glam::{DVec2, DVec3};
 
@@ -72,14 +74,23 @@ impl Scene {
         )
     }
 
-    /// The mean direction in which the tree leaves its root, a unit vector; up if it leaves to all sides alike.
-    pub(crate) fn root_direction(&self, tree: &Tree) -> DVec2 {
+    /// The direction from the root in which there is most room between its edges, a unit vector; up if it has none.
+    pub(crate) fn away_from_edges(&self, tree: &Tree) -> DVec2 {
         let root = self.points_mm[0].truncate();
-        let sum: DVec2 = tree
+        let mut headings: Vec<f64> = tree
             .children(0)
             .iter()
-            .map(|&child| (self.points_mm[child].truncate() - root).normalize_or_zero())
-            .sum();
-        if math::hypot(sum.x, sum.y) > 1e-6 { sum.normalize() } else { DVec2::NEG_Y }
+            .map(|&child| angle::heading(self.points_mm[child].truncate() - root))
+            .collect();
+        headings.sort_by(f64::total_cmp);
+        let Some(&first) = headings.first() else { return DVec2::Y };
+        let next = headings.iter().skip(1).copied().chain([first + TAU]);
+        let (_, heading) = headings
+            .iter()
+            .zip(next)
+            .map(|(&from, to)| (to - from, 0.5 * (from + to)))
+            .reduce(|widest, other| if other.0 > widest.0 { other } else { widest })
+            .unwrap_or((0.0, first));
+        math::unit_vector(heading)
     }
 }

@@ -12,9 +12,9 @@ use crate::palette::Rgb;
 use crate::params::Style;
 
 /// Towards the light: left, up, to the viewer (y points down). Unit length to six digits.
-const TO_LIGHT: Vec3 = Vec3::new(-0.433_861, -0.542_326, 0.719_477);
+const TO_LIGHT: Vec3 = Vec3::new(-0.35, -0.42, 0.837_317);
 /// Half way between light and viewer.
-const HALFWAY: Vec3 = Vec3::new(-0.233_953, -0.292_442, 0.927_227);
+const HALFWAY: Vec3 = Vec3::new(-0.182_584, -0.219_101, 0.958_466);
 /// How far the light reaches past the terminator.
 const WRAP: f32 = 0.35;
 const AMBIENT: f32 = 0.50;
