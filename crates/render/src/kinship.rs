@@ -69,3 +69,45 @@ impl Kinship {
         false
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use espalier_model::Node;
+    use glam::DVec3;
+
+    use super::*;
+
+    #[test]
+    fn paths_go_over_the_fork_that_both_places_hang_from() {
+        let node = |x: f64, y: f64, parent| Node {
+            position_mm: DVec3::new(x, y, 0.0),
+            radius_mm: 1.0,
+            parent,
+            kind: 0,
+        };
+        // Two arms of length 10 with a stem of length 5; each arm forks at its end.
+        let tree = Tree::new(&[
+            node(0.0, 0.0, None),
+            node(0.0, -5.0, Some(0)),
+            node(-10.0, -5.0, Some(1)),
+            node(-12.0, -5.0, Some(2)),
+            node(-10.0, -7.0, Some(2)),
+            node(10.0, -5.0, Some(1)),
+            node(12.0, -5.0, Some(5)),
+            node(10.0, -7.0, Some(5)),
+        ])
+        .expect("a tree");
+        let scene = Scene {
+            points_mm: tree.nodes().iter().map(|node| node.position_mm).collect(),
+            radii_mm: vec![1.0; 8],
+        };
+        let kinship = Kinship::new(&tree, &tree.branches(), &scene, 2.0);
+        let end = |node: u32| (node, kinship.arc_px[node as usize]);
+        for (a, b, path_px) in [(3, 4, 8.0), (3, 6, 48.0), (1, 7, 24.0), (2, 3, 4.0), (5, 5, 0.0)] {
+            for (a, b) in [(a, b), (b, a)] {
+                assert!(kinship.is_near(end(a), end(b), path_px + 0.01), "{a} {b}");
+                assert!(!kinship.is_near(end(a), end(b), path_px - 0.01), "{a} {b}");
+            }
+        }
+    }
+}

@@ -7,8 +7,8 @@
 //! | 3 | `heading`, `furniture`, `text` | what stands beside the tree, and how much room it needs |
 //! | 4 | `page` | scale and places |
 //! | 5 | `sketch`, `cone`, `kinship` | edges as round cones in pixels |
-//! | 6 | `raster`, `shade` | the pixels |
-//! | 7 | `paint`, `svg`, `layers` | the files |
+//! | 6 | `raster`, `samples`, `shade` | the pixels |
+//! | 7 | `paint`, `svg`, `outline`, `layers` | the files |
 //!
 //! **Source** section 4.1 of [Hu2022].
 
@@ -32,9 +32,11 @@ mod kinship;
 mod sketch;
 
 mod raster;
+mod samples;
 mod shade;
 
 mod layers;
+mod outline;
 mod paint;
 mod svg;
 
