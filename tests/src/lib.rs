@@ -1,5 +1,6 @@
 //! Helpers of the end-to-end suite.
 
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use espalier_model::{Embedding, Tree, swc};
@@ -22,7 +23,7 @@ pub fn real_data() -> Option<PathBuf> {
 
 /// A `--set` of the command line.
 #[must_use]
-pub fn set(key: &str, value: impl ToString) -> Override {
+pub fn set(key: &str, value: impl Display) -> Override {
     Override { key: key.to_owned(), value: value.to_string() }
 }
 

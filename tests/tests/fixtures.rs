@@ -1,4 +1,5 @@
 //! The fixtures are what the phantom generator makes, on every machine; and a run from them gives known bytes.
+#![allow(clippy::expect_used, reason = "a test says what it expects")]
 
 use std::fs;
 use std::path::{Path, PathBuf};

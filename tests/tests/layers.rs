@@ -1,4 +1,5 @@
 //! The layers of the workspace: an arrow between crates points only downwards, and never between stages.
+#![allow(clippy::expect_used, reason = "a test says what it expects")]
 
 use std::collections::BTreeMap;
 use std::path::Path;

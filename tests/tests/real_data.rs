@@ -1,4 +1,5 @@
 //! The whole way on other people's scans, masks and neurons: certified, and plausible.
+#![allow(clippy::expect_used, reason = "a test says what it expects")]
 
 use std::path::Path;
 

@@ -1,4 +1,5 @@
 //! Same inputs, config and seed: the same bytes, whatever the threads, the folder, or where the run begins.
+#![allow(clippy::expect_used, reason = "a test says what it expects")]
 
 use std::path::{Path, PathBuf};
 

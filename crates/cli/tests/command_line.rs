@@ -1,4 +1,5 @@
 //! The program as its user meets it: exit codes, messages, files left behind.
+#![allow(clippy::expect_used, reason = "a test says what it expects")]
 
 use std::fs;
 use std::path::Path;

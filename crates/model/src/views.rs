@@ -317,7 +317,8 @@ mod tests {
             change(&mut views);
             ViewHierarchy::from_json(&views.to_json(), &fork_tree()).expect_err("refused").to_string()
         };
-        let cases: [(fn(&mut ViewHierarchy), &str); 8] = [
+        type Change = fn(&mut ViewHierarchy);
+        let cases: [(Change, &str); 8] = [
             (|v| v.chains.truncate(2), "2 chains, the tree has 3 branches"),
             (|v| v.forks[1] = None, "the forks are not the tree's own"),
             (|v| v.forks.push(None), "made for 5 nodes, the tree has 4"),

@@ -99,15 +99,14 @@ impl Artifacts {
 
     pub(crate) fn spheres(&mut self, lookup: Lookup<'_>) -> Result<Arc<InscribedSpheres>, Error> {
         let spheres = self.spheres.clone();
-        let spheres =
-            self.parsed(spheres, Artifact::Spheres, lookup, |text| InscribedSpheres::from_tsv(text))?;
+        let spheres = self.parsed(spheres, Artifact::Spheres, lookup, InscribedSpheres::from_tsv)?;
         self.spheres = Some(Arc::clone(&spheres));
         Ok(spheres)
     }
 
     pub(crate) fn tree(&mut self, lookup: Lookup<'_>) -> Result<Arc<Tree>, Error> {
         let tree = self.tree.clone();
-        let tree = self.parsed(tree, Artifact::Tree, lookup, |text| swc::read_tree(text))?;
+        let tree = self.parsed(tree, Artifact::Tree, lookup, swc::read_tree)?;
         self.tree = Some(Arc::clone(&tree));
         Ok(tree)
     }

@@ -20,10 +20,9 @@ pub(crate) struct StageCost {
 /// Writes `provenance/config.resolved.toml`: every key of the run, and nothing of this machine.
 pub(crate) fn write_config(folder: &mut RunFolder, config: &Config) -> Result<(), Error> {
     let mut portable = config.clone();
-    if let Some(path) = &mut portable.input.path {
-        if let (true, Some(name)) = (Path::new(path).is_absolute(), Path::new(path).file_name()) {
-            *path = name.to_string_lossy().into_owned();
-        }
+    if let Some(path) = portable.input.path.as_mut().filter(|path| Path::new(path).is_absolute()) {
+        let name = Path::new(path).file_name().unwrap_or_default().to_string_lossy().into_owned();
+        *path = name;
     }
     folder.write("provenance/config.resolved.toml", portable.to_toml().as_bytes()).map(|_| ())
 }

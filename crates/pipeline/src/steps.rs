@@ -6,16 +6,16 @@ use std::sync::Arc;
 
 use espalier_model::table::{Table, fixed};
 use espalier_model::{
-    Embedding, Grid, GridError, InscribedSpheres, Ledger, Mask, MethodRow, Report, ViewHierarchy, Volume,
-    nifti_out, swc,
+    Embedding, Grid, GridError, InscribedSpheres, Ledger, Mask, MethodRow, Report, ViewHierarchy, nifti_out,
+    swc,
 };
-use espalier_phantom::Phantom;
 
 use crate::artifacts::{Artifacts, Lookup};
 use crate::config::{Config, Source};
 use crate::error::Error;
 use crate::event::Event;
 use crate::folder::RunFolder;
+use crate::phantom;
 use crate::run::boxed;
 use crate::stage::{Artifact, Stage};
 
@@ -51,44 +51,27 @@ pub(crate) fn perform(step: &mut Step<'_>) -> Result<Outcome, Error> {
 }
 
 fn phantom(step: &mut Step<'_>) -> Result<Outcome, Error> {
-    let Config { phantom: params, seed, .. } = step.config;
-    let failed = |error| Error::stage(Stage::Phantom)(boxed(error));
+    let (kind, scanned) = match *step.source {
+        Source::PhantomScan(kind) => (kind, true),
+        Source::PhantomTree(kind) => (kind, false),
+        Source::Volume(_) | Source::Tree(_) => {
+            let available = "volume to render".to_owned();
+            return Err(Error::NoSuchStage { flag: "from", stage: Stage::Phantom, available });
+        }
+    };
+    let made = phantom::make(kind, step.config, scanned)?;
     let mut report = Report::default();
-    match *step.source {
-        Source::PhantomTree(kind) => {
-            let tree = espalier_phantom::grow_tree(kind, params, *seed).map_err(failed)?;
-            report.count_usize("nodes", tree.n_nodes());
-            let text = swc::write(&tree, &[("phantom", kind.name())]);
-            step.artifacts.traced_scale = Some(swc::SwcScale::millimetres());
-            let line = format!("{}: {} nodes, {} tips", kind.name(), tree.n_nodes(), tree.n_tips());
-            Ok(Outcome { files: vec![step.place(Artifact::Traced, text.into_bytes())], report, line })
-        }
-        Source::PhantomScan(kind) => {
-            let made = espalier_phantom::generate(kind, params, *seed).map_err(failed)?;
-            let scan = espalier_phantom::ct(&made, params, *seed).map_err(failed)?;
-            report.count_usize("nodes", made.tree.n_nodes());
-            report.count_usize("voxels", scan.grid().n_voxels());
-            let line =
-                format!("{}: {} tips, {}", kind.name(), made.tree.n_tips(), describe_grid(scan.grid()));
-            let files = phantom_files(&made, &scan)?;
-            let files = files.into_iter().map(|(name, bytes)| step.beside(name, bytes)).collect();
-            Ok(Outcome { files, report, line })
-        }
-        // A run from a file has no phantom stage.
-        Source::Volume(_) | Source::Tree(_) => Ok(Outcome { files: Vec::new(), report, line: String::new() }),
+    report.count_usize("nodes", made.tree.n_nodes());
+    report.count_usize("tips", made.tree.n_tips());
+    let mut line = format!("{}: {} nodes, {} tips", kind.name(), made.tree.n_nodes(), made.tree.n_tips());
+    if let Some(scan) = &made.scan {
+        report.count_usize("voxels", scan.grid().n_voxels());
+        line = format!("{line}, {}", describe_grid(scan.grid()));
+    } else {
+        step.artifacts.traced_scale = Some(swc::SwcScale::millimetres());
     }
-}
-
-/// The files of a phantom that has a scan, by name.
-pub(crate) fn phantom_files(made: &Phantom, scan: &Volume) -> Result<Vec<(&'static str, Vec<u8>)>, Error> {
-    let failed = |error| Error::stage(Stage::Phantom)(boxed(error));
-    let truth = swc::write(&made.tree, &[("phantom", made.kind.name())]);
-    let mut files =
-        vec![("ct.nii.gz", nifti_out::volume(scan).map_err(failed)?), ("truth.swc", truth.into_bytes())];
-    if let Some(mask) = &made.mask {
-        files.push(("truth-mask.nii.gz", nifti_out::mask(mask).map_err(failed)?));
-    }
-    Ok(files)
+    let files = made.files()?.into_iter().map(|(name, bytes)| step.beside(name, bytes)).collect();
+    Ok(Outcome { files, report, line })
 }
 
 fn volume(step: &mut Step<'_>) -> Result<Outcome, Error> {
