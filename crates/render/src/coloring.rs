@@ -10,7 +10,7 @@
 //! by default the local radius, so that a narrowing inside a branch is seen; `branch-radius` is the paper's.
 
 use espalier_geom::{angle, math};
-use espalier_model::{Branches, Embedding, Tree};
+use espalier_model::{Branch, Branches, Embedding, Tree};
 
 use crate::palette::Palette;
 use crate::params::{ColorBy, Params};
@@ -102,22 +102,26 @@ fn local_radii(tree: &Tree) -> Vec<[f64; 2]> {
     (0..tree.n_nodes()).map(|node| [radius(tree.parent(node).unwrap_or(node)), radius(node)]).collect()
 }
 
-/// By node: the mean radius of its branch over the length, at both ends.
+/// By node: the mean radius of its branch, at both ends.
 fn branch_radii(tree: &Tree, branches: &Branches) -> Vec<[f64; 2]> {
-    let local = local_radii(tree);
-    let mut radii = local.clone();
+    let mut radii = local_radii(tree);
     for branch in branches.list() {
-        let (mut weighted, mut length) = (0.0, 0.0);
-        for node in branch.nodes.clone() {
-            let edge = tree.edge_length_mm(node);
-            weighted += edge * 0.5 * (local[node][0] + local[node][1]);
-            length += edge;
-        }
-        for node in branch.nodes.clone() {
-            radii[node] = [weighted / length; 2];
-        }
+        let mean = mean_radius_mm(tree, branch);
+        radii[branch.nodes.clone()].fill([mean; 2]);
     }
     radii
+}
+
+/// The mean radius of a branch over its length, mm.
+pub(crate) fn mean_radius_mm(tree: &Tree, branch: &Branch) -> f64 {
+    let radius = |node: usize| tree.nodes()[node].radius_mm;
+    let (mut weighted, mut length) = (0.0, 0.0);
+    for node in branch.nodes.clone() {
+        let edge = tree.edge_length_mm(node);
+        weighted += edge * 0.5 * (radius(node) + radius(tree.parent(node).unwrap_or(node)));
+        length += edge;
+    }
+    weighted / length
 }
 
 fn by_radius(tree: &Tree, radii_mm: &[[f64; 2]], params: &Params) -> Coloring {

@@ -174,7 +174,7 @@ pub(crate) fn root_mark(page: &Page, tree: &Tree, scene: &Scene, colors: &PageCo
     let center = page.px(scene.points_mm[0].truncate());
     let radius_px = (page.radius_px(scene.radii_mm[0]) + 0.35 * unit).max(0.65 * unit);
     let ring = |width: f64, color| Mark::Ring { center, radius_px, width_px: width * unit, color };
-    let away = scene.away_from_edges(tree);
+    let away = scene.away_from_branches(tree, 4.0 * unit / page.px_per_mm);
     let away = DVec2::new(away.x, -away.y);
     let size_px = BODY * unit;
     let (anchor, at) = if away.x.abs() > 0.8 {

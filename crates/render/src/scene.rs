@@ -74,14 +74,21 @@ impl Scene {
         )
     }
 
-    /// The direction from the root in which there is most room between its edges, a unit vector; up if it has none.
-    pub(crate) fn away_from_edges(&self, tree: &Tree) -> DVec2 {
+    /// The direction from the root in which there is most room between its branches, a unit vector; up if it has
+    /// none. A branch heads for its first node that is at least `reach_mm` away: the first edge alone may wander.
+    pub(crate) fn away_from_branches(&self, tree: &Tree, reach_mm: f64) -> DVec2 {
         let root = self.points_mm[0].truncate();
-        let mut headings: Vec<f64> = tree
-            .children(0)
-            .iter()
-            .map(|&child| angle::heading(self.points_mm[child].truncate() - root))
-            .collect();
+        let offset = |node: usize| self.points_mm[node].truncate() - root;
+        let heading_of = |child: usize| {
+            let mut node = child;
+            while let &[only] = tree.children(node)
+                && offset(node).length() < reach_mm
+            {
+                node = only;
+            }
+            angle::heading(offset(node))
+        };
+        let mut headings: Vec<f64> = tree.children(0).iter().map(|&child| heading_of(child)).collect();
         headings.sort_by(f64::total_cmp);
         let Some(&first) = headings.first() else { return DVec2::Y };
         let next = headings.iter().skip(1).copied().chain([first + TAU]);

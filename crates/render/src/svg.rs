@@ -12,7 +12,7 @@ use std::fmt::Write as _;
 use espalier_model::{Branch, Branches, Tree};
 use glam::DVec2;
 
-use crate::coloring::Coloring;
+use crate::coloring::{Coloring, mean_radius_mm};
 use crate::drawing::{Group, Mark};
 use crate::outline::outline;
 use crate::page::Page;
@@ -74,7 +74,7 @@ pub(crate) fn svg(content: &Content<'_>, page: &Page, groups: &[Group], colors: 
     out
 }
 
-/// The branches; the root's last, so that a parent covers the starts of its children.
+/// The branches, thick over thin as in the raster; of equals the parent over the starts of its children.
 fn tree(out: &mut String, content: &Content<'_>, page: &Page, colors: &PageColors) {
     let list = content.branches.list();
     if list.is_empty() {
@@ -88,20 +88,23 @@ fn tree(out: &mut String, content: &Content<'_>, page: &Page, colors: &PageColor
         );
         return;
     }
+    let mut order: Vec<usize> = (0..list.len()).rev().collect();
+    let radii: Vec<f64> = list.iter().map(|branch| mean_radius_mm(content.tree, branch)).collect();
+    order.sort_by(|&a, &b| radii[a].total_cmp(&radii[b]));
     if page.pen.style == Style::PseudoSurface {
         let rim = hex(colors.rim);
         let _ = writeln!(
             out,
             "<g id=\"edges\" stroke=\"{rim}\" stroke-opacity=\"0.75\" stroke-width=\"1.3\" stroke-linejoin=\"round\">"
         );
-        for branch in (0..list.len()).rev() {
+        for branch in &order {
             let _ = writeln!(out, "<use xlink:href=\"#branch-{branch}\"/>");
         }
         out.push_str("</g>\n");
     }
     out.push_str("<g id=\"branches\">\n");
-    for (branch_idx, branch) in list.iter().enumerate().rev() {
-        write_branch(out, content, page, (branch_idx, branch));
+    for &branch in &order {
+        write_branch(out, content, page, (branch, &list[branch]));
     }
     out.push_str("</g>\n");
 }
@@ -113,13 +116,10 @@ fn write_branch(
     (branch_idx, branch): (usize, &Branch),
 ) {
     let (tree, scene) = (content.tree, content.scene);
-    let (mut value, mut weighted_radius, mut length) = (0.0, 0.0, 0.0);
+    let (mut value, mut length) = (0.0, 0.0);
     for node in branch.nodes.clone() {
         let edge = tree.edge_length_mm(node);
-        let parent = tree.parent(node).unwrap_or(node);
-        let radius = |node: usize| tree.nodes()[node].radius_mm;
         value += edge * f64::from(content.coloring.ends[node].iter().sum::<f32>()) / 2.0;
-        weighted_radius += edge * 0.5 * (radius(node) + radius(parent));
         length += edge;
     }
     let fill = hex(content.coloring.palette.at((value / length) as f32));
@@ -145,7 +145,7 @@ fn write_branch(
         branch.strahler,
         branch.nodes.start,
         branch.end(),
-        weighted_radius / length,
+        mean_radius_mm(tree, branch),
     );
 }
 
