@@ -77,7 +77,7 @@ pub(crate) enum Command {
 pub(crate) struct RunArguments {
     /// A config (.toml), or an input: .nii, .nii.gz, .swc
     pub(crate) config_or_input: PathBuf,
-    /// The run folder [default: out/<name>]
+    /// The run folder [default: out/NAME]
     #[arg(short, long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Begin at this stage, with what the earlier ones left in the run folder

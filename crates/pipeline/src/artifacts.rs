@@ -5,11 +5,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use espalier_model::swc::{self, SwcScale, Traced};
+use espalier_model::swc::{self, Traced};
 use espalier_model::{
     Diagnose, Embedding, InscribedSpheres, Mask, Report, Skeleton, Tree, ViewHierarchy, Volume,
 };
 
+use crate::config::Input;
 use crate::error::Error;
 use crate::folder::RunFolder;
 use crate::stage::{Artifact, Stage};
@@ -20,7 +21,8 @@ pub(crate) struct Artifacts {
     /// Files named by the user, instead of those in the run folder.
     pub(crate) files: BTreeMap<Artifact, PathBuf>,
     pub(crate) read_options: espalier_volume::ReadOptions,
-    pub(crate) traced_scale: Option<SwcScale>,
+    /// How a traced tree is scaled.
+    pub(crate) input: Input,
     pub(crate) volume: Option<Arc<Volume>>,
     pub(crate) traced: Option<Arc<Traced>>,
     pub(crate) mask: Option<Arc<Mask>>,
@@ -58,7 +60,7 @@ impl Artifacts {
         }
         let path = self.locate(Artifact::Traced, lookup)?;
         let bytes = fs::read(&path).map_err(|source| Error::Read { path: path.clone(), source })?;
-        let scale = self.traced_scale.unwrap_or_else(SwcScale::millimetres);
+        let scale = self.input.traced_scale(swc::is_own(&bytes));
         let (traced, report) = swc::parse(&bytes, &scale).map_err(|error| Error::file(&path, error))?;
         let traced = Arc::new(traced);
         self.traced = Some(Arc::clone(&traced));

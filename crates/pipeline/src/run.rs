@@ -198,7 +198,7 @@ fn artifacts_of(request: &Request, source: &Source) -> Artifacts {
             unit_mm: (input.unit != Unit::Auto).then(|| input.unit.mm()),
             strict: input.strict,
         },
-        traced_scale: matches!(source, Source::Tree(_)).then(|| input.traced_scale()),
+        input: input.clone(),
         ..Artifacts::default()
     }
 }

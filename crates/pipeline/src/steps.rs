@@ -67,8 +67,6 @@ fn phantom(step: &mut Step<'_>) -> Result<Outcome, Error> {
     if let Some(scan) = &made.scan {
         report.count_usize("voxels", scan.grid().n_voxels());
         line = format!("{line}, {}", describe_grid(scan.grid()));
-    } else {
-        step.artifacts.traced_scale = Some(swc::SwcScale::millimetres());
     }
     let files = made.files()?.into_iter().map(|(name, bytes)| step.beside(name, bytes)).collect();
     Ok(Outcome { files, report, line })

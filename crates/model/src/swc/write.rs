@@ -73,6 +73,12 @@ pub fn read_tree(text: &str) -> Result<Tree, SwcError> {
     Ok(Tree::new(&nodes)?)
 }
 
+/// Whether a text says that it is a file of [`write()`], hence in mm.
+#[must_use]
+pub fn is_own(text: &[u8]) -> bool {
+    text.starts_with(format!("# format {FORMAT} ").as_bytes())
+}
+
 /// The first header line with `key` must say `expected`.
 fn expect_header(text: &str, key: &'static str, expected: &'static str) -> Result<(), SwcError> {
     let value_of =

@@ -27,7 +27,7 @@ pub enum InputKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Unit {
-    /// By the header of a volume; µm for a traced tree.
+    /// By the header of a volume; µm for a traced tree, mm if espalier wrote it.
     #[default]
     Auto,
     /// Millimetres.
@@ -71,7 +71,8 @@ pub struct Input {
     pub assume_space: Option<espalier_volume::AssumedSpace>,
     /// Refuse what would otherwise be repaired with a warning. Default false.
     pub strict: bool,
-    /// The unit of the input's coordinates. Default `auto`: by the header of a volume, µm for a traced tree.
+    /// The unit of the input's coordinates. Default `auto`: by the header of a volume; µm for a
+    /// traced tree, mm if espalier wrote it.
     pub unit: Unit,
     /// How many units a step in x, y, z of a traced tree is. Default 1, 1, 1; for files in pixels and slices.
     pub scale: [f64; 3],
@@ -134,10 +135,11 @@ impl Input {
         )
     }
 
-    /// How many mm a step in a traced tree's coordinates and radii is.
+    /// How many mm a step in the coordinates and radii of a traced tree is; espalier's own files are in mm unless
+    /// `unit` says otherwise.
     #[must_use]
-    pub fn traced_scale(&self) -> SwcScale {
-        let unit_mm = self.unit.mm();
+    pub fn traced_scale(&self, is_own_file: bool) -> SwcScale {
+        let unit_mm = if self.unit == Unit::Auto && is_own_file { 1.0 } else { self.unit.mm() };
         SwcScale {
             position_mm: DVec3::from_array(self.scale) * unit_mm,
             radius_mm: self.radius_scale * unit_mm,
