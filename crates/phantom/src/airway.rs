@@ -4,7 +4,7 @@
 //! **Spaces** RAS mm, the carina at the origin, the trachea upwards; the right lung at +x.
 //! **Steps** 1. scatter points over both lungs, sort them by lobe; 2. lay the [`TEMPLATE`], each branch as thick as
 //! its share of the points asks by Murray's law; 3. grow each lobe.
-//! **Source** diameters and lengths of the first generations: \[Weibel1963\], \[Horsfield1971\], rounded; the right main
+//! **Source** diameters and lengths of the first generations: [Weibel1963], [Horsfield1971], rounded; the right main
 //! bronchus is shorter, wider and steeper than the left.
 
 use espalier_geom::math;

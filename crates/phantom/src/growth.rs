@@ -13,8 +13,8 @@
 //!
 //! **Guarantees** every fork has two children and keeps Σ r³; no two branches that are not neighbours come nearer
 //! than the clearance; the result depends on the seed alone.
-//! **Source** the split of the served cloud: \[Tawhai2004\]; rotating planes and flow-dividing radii:
-//! \[Kitaoka1999\]; lengths of about three diameters: \[Weibel1963\].
+//! **Source** the split of the served cloud: [Tawhai2004]; rotating planes and flow-dividing radii:
+//! [Kitaoka1999]; lengths of about three diameters: [Weibel1963].
 //! **Cost** O(points · generations + branches²), the square being box tests.
 
 use std::collections::VecDeque;

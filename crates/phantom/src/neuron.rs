@@ -6,7 +6,7 @@
 //! of a few directions near its own, forks while the tree has fewer tips than one in [`NODES_PER_TIP`] nodes, or
 //! now and then rests for good; 3. stop at exactly `n_nodes`; 4. radii from the tips inwards.
 //! **Guarantees** exactly `n_nodes` nodes, no two nearer than a quarter of a step; every node but the soma has at most
-//! two children; r^(3/2) of a parent is the sum of its children's up to a greatest radius \[Rall1959\].
+//! two children; r^(3/2) of a parent is the sum of its children's up to a greatest radius [Rall1959].
 //! **Cost** O(n_nodes log n_nodes).
 
 use std::collections::{BTreeMap, VecDeque};

@@ -2,7 +2,7 @@
 //!
 //! **Input** [`Params`] (`generations`, `min_radius_mm`, `clearance_mm`), a seed, the attempt. **Output** [`Shape`].
 //! **Spaces** RAS mm, the middle of the liver at the origin.
-//! **Guarantees** r³ of a parent is the sum of its children's r³ \[Murray1926\].
+//! **Guarantees** r³ of a parent is the sum of its children's r³ [Murray1926].
 
 use espalier_geom::random::{Purpose, Stream};
 use glam::DVec3;

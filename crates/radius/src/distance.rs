@@ -8,7 +8,7 @@
 //! axis taken in. Nothing beyond a run's end can be nearer than that end, so runs are independent.
 //! **Guarantees** exact up to rounding in `f64`; the border of the scan is not background; the result does not
 //! depend on the number of threads.
-//! **Source** \[Felzenszwalb2012\] section 2.1, restricted to runs.
+//! **Source** [Felzenszwalb2012] section 2.1, restricted to runs.
 //! **Cost** O(foreground) time; eight bytes a voxel of the foreground's box, of which the system provides only
 //! the pages that hold foreground.
 

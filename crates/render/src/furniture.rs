@@ -220,7 +220,7 @@ pub(crate) fn compass(
 /// is left out.
 pub(crate) fn direction_letters(direction: DVec3, kind: Compass) -> Option<String> {
     let names = match kind {
-        Compass::Anatomical => [["R", "L"], ["A", "P"], ["S", "I"]],
+        Compass::Auto | Compass::Anatomical => [["R", "L"], ["A", "P"], ["S", "I"]],
         Compass::Axes => [["+x ", "−x "], ["+y ", "−y "], ["+z ", "−z "]],
         Compass::None => return None,
     };

@@ -13,7 +13,7 @@ use crate::Error;
 use crate::params::Style;
 use crate::scene::Scene;
 
-/// How many pixels a picture may have: at 28 bytes each, a gigabyte.
+/// How many pixels a picture may have: at 32 bytes each, a gigabyte.
 pub(crate) const MAX_PIXELS: u64 = 1 << 25;
 /// Bounds of height over width of the tree's area.
 const ASPECT: [f64; 2] = [0.42, 1.35];

@@ -67,8 +67,10 @@ pub enum Unit {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Compass {
-    /// R L A P S I: right, left, anterior, posterior, superior, inferior of the patient.
+    /// Anatomical, unless the caller knows that the tree was not made from a scan: then axes.
     #[default]
+    Auto,
+    /// R L A P S I: right, left, anterior, posterior, superior, inferior of the patient.
     Anatomical,
     /// +x −x +y −y +z −z, for data without a body, such as a neuron in a slice.
     Axes,
@@ -100,7 +102,7 @@ pub struct Params {
     pub min_width_px: f64,
     /// Unit of the scale bar and of the radii. Default automatic.
     pub unit: Unit,
-    /// Letters at the edges of the global view. Default anatomical, which is right for scans.
+    /// Letters at the edges of the global view. Default auto: anatomical for a scan, axes for a traced tree.
     pub compass: Compass,
     /// Whether to make the EXR with its layers. Default true; it is the largest of the files.
     pub exr: bool,
@@ -117,7 +119,7 @@ impl Default for Params {
             width_scale: 1.0,
             min_width_px: 2.0,
             unit: Unit::Auto,
-            compass: Compass::Anatomical,
+            compass: Compass::Auto,
             exr: true,
         }
     }

@@ -12,7 +12,7 @@
 //! **Guarantees** the same bytes for any number of threads: a band of tiles is one task, and inside a tile cones
 //! come in preorder.
 //! **Source** section 4.1 of [Hu2022]; the blending is ours.
-//! **Cost** O(S² · drawn area + E) time, 28 bytes a pixel.
+//! **Cost** O(S² · drawn area + E) time, 32 bytes a pixel.
 
 use glam::Vec2;
 use rayon::prelude::*;

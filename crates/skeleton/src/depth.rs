@@ -7,7 +7,7 @@
 //! **Steps** 1. Forward in raster order: least over the 13 earlier neighbours. 2. Backward: over the 13 later.
 //! **Guarantees** integers only after the weights are made; within 8 % of the Euclidean distance on isotropic
 //! grids, which is all that an order of peeling needs.
-//! **Source** \[Borgefors1986\]: the 3-4-5 weights.
+//! **Source** [Borgefors1986]: the 3-4-5 weights.
 //! **Cost** O(foreground) time, two bytes a cell.
 
 use crate::lattice::Lattice;

@@ -7,7 +7,7 @@
 //! eighth of each of its 8 voxels, so that χ is the sum over all vertices of
 //! χ₈(S)/8 = \[S ≠ ∅\] − edges/2 + faces/4 − |S|/8, where only edges and faces touched by S count.
 //! 2. Removing the centre changes the 8 vertices of its cube: δ = Σ χ₈(with it) − χ₈(without it).
-//! **Source** \[Lee94\] section 3: the values δ are its Table 2, generated here from the formula.
+//! **Source** [Lee94] section 3: the values δ are its Table 2, generated here from the formula.
 //! **Cost** eight table look-ups.
 
 use crate::simple::CENTER;

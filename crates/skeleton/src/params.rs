@@ -21,7 +21,7 @@ pub enum Thinning {
     /// Ours: nothing vanishes, components and Euler number stay, tubes keep their length.
     #[default]
     Safe,
-    /// As published in \[Lee94\] and implemented in scikit-image and ITK, bit for bit. May lose thin parts of even
+    /// As published in [Lee94] and implemented in scikit-image and ITK, bit for bit. May lose thin parts of even
     /// width and may change the topology, which the report then says.
     Lee94,
 }
@@ -40,7 +40,7 @@ pub enum Orientation {
 impl Params {
     /// The values that the paper's skeletons come nearest to: the published thinning rule.
     ///
-    /// \[Hu2022\] takes its vessel skeletons from another program, so only the class of the method is theirs.
+    /// [Hu2022] takes its vessel skeletons from another program, so only the class of the method is theirs.
     #[must_use]
     pub fn paper() -> Self {
         Self { thinning: Thinning::Lee94, orientation: Orientation::Ras }

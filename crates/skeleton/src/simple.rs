@@ -7,7 +7,7 @@
 //! **Guarantees** a voxel with Euler change 0 and one component of neighbours is simple in the full sense: it
 //! meets the rest in a set with b₀ = 1 and b₀ − b₁ + b₂ = 1, and b₂ = 1 only where all 26 neighbours are there
 //! and b₁ = 0. Removing it alters no component, tunnel or cavity.
-//! **Source** \[Lee94\] section 4; flood by shifts in place of its octree labels, with the same answer.
+//! **Source** [Lee94] section 4; flood by shifts in place of its octree labels, with the same answer.
 //! **Cost** at most 13 growing steps of a few instructions.
 
 /// The bit of the voxel itself.

@@ -12,7 +12,7 @@
 //!
 //! **Guarantees** a fixed order, so one result. `safe` deletes only voxels that are simple in the full sense at the
 //! moment of their deletion, so it keeps components, tunnels and cavities, and no component vanishes.
-//! **Source** \[Lee94\] section 5; direction order as in scikit-image and ITK. Levels of distance: \[Pudney1998\].
+//! **Source** [Lee94] section 5; direction order as in scikit-image and ITK. Levels of distance: [Pudney1998].
 //! **Differs from the source** for `lee94` only in speed: a list of *open* voxels stands for the whole volume. The
 //! predicate of step 1 depends on the 26 neighbours alone, so a voxel found wanting leaves the list until one of
 //! them is deleted.
@@ -156,7 +156,7 @@ fn collect(
     collected
 }
 
-/// Deletes, in raster order, what is still simple; \[Lee94\] tests nothing else here.
+/// Deletes, in raster order, what is still simple; [Lee94] tests nothing else here.
 fn recheck_lee94(lattice: &mut Lattice, open: &mut Open, collected: Vec<usize>) -> usize {
     let mut n_deleted = 0;
     for cell in collected {

@@ -152,8 +152,7 @@ impl Input {
     /// [`ParamError`] if the path begins with `$ESPALIER_DATA` and there is no `data_dir`.
     pub fn resolve(&self, base_dir: &Path, data_dir: Option<&Path>) -> Result<Source, ParamError> {
         if let Some(kind) = self.phantom {
-            let is_tree = kind == espalier_phantom::Kind::Neuron || self.kind == InputKind::Tree;
-            return Ok(if is_tree { Source::PhantomTree(kind) } else { Source::PhantomScan(kind) });
+            return Ok(if self.is_traced() { Source::PhantomTree(kind) } else { Source::PhantomScan(kind) });
         }
         let written = self.path.as_deref().unwrap_or_default();
         let path = match written.strip_prefix(DATA_VARIABLE) {
@@ -166,11 +165,18 @@ impl Input {
             }
             None => base_dir.join(written),
         };
-        let is_swc = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("swc"));
-        Ok(match self.kind {
-            InputKind::Tree => Source::Tree(path),
-            InputKind::Auto if is_swc => Source::Tree(path),
-            InputKind::Auto | InputKind::Volume => Source::Volume(path),
-        })
+        Ok(if self.is_traced() { Source::Tree(path) } else { Source::Volume(path) })
+    }
+
+    /// Whether the run begins with a traced tree rather than a volume.
+    #[must_use]
+    pub fn is_traced(&self) -> bool {
+        let written = Path::new(self.path.as_deref().unwrap_or_default());
+        let is_swc = written.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("swc"));
+        match self.kind {
+            InputKind::Tree => true,
+            InputKind::Volume => false,
+            InputKind::Auto => is_swc || self.phantom == Some(espalier_phantom::Kind::Neuron),
+        }
     }
 }

@@ -10,6 +10,7 @@ mod place;
 use std::path::{Path, PathBuf};
 
 use espalier_model::diagnose::{Class, Diagnose, ParamError};
+use espalier_render::Compass;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -120,7 +121,7 @@ impl Config {
         let alone: Self = toml::from_str(text).map_err(|error| source.parse_error(&error))?;
         let config = if overrides.is_empty() { alone } else { source.overridden(overrides)? };
         config.validate(&source)?;
-        Ok(config)
+        Ok(config.with_defaults_of_input())
     }
 
     /// The config of a run that is given only its input, under `overrides`.
@@ -144,6 +145,15 @@ impl Config {
     pub fn to_toml(&self) -> String {
         // Plain structs of numbers, strings, enums and tables: serialisation cannot fail.
         toml::to_string(self).unwrap_or_default()
+    }
+
+    /// The config with the defaults that hang on the kind of input filled in, so that the resolved copy has them.
+    fn with_defaults_of_input(mut self) -> Self {
+        if self.render.compass == Compass::Auto {
+            // Only a scan says where right and left of the patient are.
+            self.render.compass = if self.input.is_traced() { Compass::Axes } else { Compass::Anatomical };
+        }
+        self
     }
 
     fn validate(&self, source: &place::SourceText<'_>) -> Result<(), Box<ConfigError>> {
