@@ -102,6 +102,7 @@ pub(crate) fn select(
         Termination::Constructed
     };
     let embedding = Embedding {
+        tree: problem.tree.digest(),
         method: name,
         seed,
         positions_mm: posed.positions,

@@ -14,7 +14,8 @@ pub enum TargetKind {
     Projected,
 }
 
-/// What an embedding aims at, by node; frozen before any method runs.
+/// What an embedding aims at, by node; frozen before any method runs, and in the handedness of the global view: in
+/// a picture that is reflected (see [`Pose`]) angles run the other way round.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Targets {
     /// How they were made.
@@ -97,7 +98,8 @@ impl Certificate {
     }
 }
 
-/// The rigid motion (and mirror) of the whole that was applied last.
+/// The rigid motion (and mirror) of the whole that was applied last. It costs no energy and no loss: all of them
+/// are those of the layout before it was reflected.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pose {
     /// Rotation counter-clockwise in radians, applied after the reflection.
@@ -156,6 +158,8 @@ pub struct MethodRow {
 /// `quantum_mm`, exactly as they are written; the certificate is for these numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Embedding {
+    /// The digest of its tree: [`Tree::digest`](crate::Tree::digest).
+    pub tree: String,
     /// The method whose layout this is.
     pub method: String,
     /// The seed it was made with.

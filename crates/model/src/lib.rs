@@ -19,6 +19,7 @@
 //! **Architecture Invariant:** no algorithms here, and no file access: files are bytes in and bytes out.
 
 pub mod diagnose;
+mod digest;
 mod embedding;
 mod grid;
 mod ledger;

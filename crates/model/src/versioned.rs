@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::diagnose::{Class, Diagnose};
+use crate::tree::Tree;
 
 /// Why a stage file cannot be used.
 #[derive(Debug, Error)]
@@ -38,6 +39,16 @@ pub enum FileError {
         /// The invariant and the place.
         what: String,
     },
+    /// Well formed, but made for another tree.
+    #[error("{format} file was made for another tree: for tree {found:.12}…, this one is {expected:.12}…")]
+    OtherTree {
+        /// The format expected.
+        format: &'static str,
+        /// The digest of the tree that the file was made for.
+        found: String,
+        /// The digest of this tree.
+        expected: String,
+    },
 }
 
 impl Diagnose for FileError {
@@ -46,6 +57,7 @@ impl Diagnose for FileError {
             Self::Malformed { .. } => "E-FILE-MALFORMED",
             Self::Unknown { .. } => "E-FILE-VERSION",
             Self::Invalid { .. } => "E-FILE-INVALID",
+            Self::OtherTree { .. } => "E-FILE-OTHER-TREE",
         }
     }
 
@@ -54,7 +66,13 @@ impl Diagnose for FileError {
     }
 
     fn hint(&self) -> String {
-        "write the file again with this version of espalier: run the stage that makes it".to_owned()
+        match self {
+            Self::OtherTree { .. } => {
+                "take the tree that the file was made for, or make the file again for this tree"
+            }
+            _ => "write the file again with this version of espalier: run the stage that makes it",
+        }
+        .to_owned()
     }
 }
 
@@ -70,6 +88,16 @@ struct Envelope<T> {
 struct EnvelopeHead {
     format: String,
     version: u32,
+}
+
+/// Whether a file is for `tree`, by the digest in it.
+pub(crate) fn check_tree(format: &'static str, found: &str, tree: &Tree) -> Result<(), FileError> {
+    let expected = tree.digest();
+    if found == expected {
+        Ok(())
+    } else {
+        Err(FileError::OtherTree { format, found: found.to_owned(), expected })
+    }
 }
 
 /// The JSON text of `body` under its format and version.

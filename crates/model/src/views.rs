@@ -1,8 +1,9 @@
 //! Views of a tree, and the planes of its parts; their file `views.json`.
 //!
-//! **File** JSON, format `espalier-views` version 1: the space, the number of nodes, the global view, the
-//! subtree views, one plane per branch, one plane per fork with its node. Numbers are written with the fewest
-//! digits that read back as the same `f64`, so a file gives the very hierarchy it was written from.
+//! **File** JSON, format `espalier-views` version 1: the digest of its tree, the space, the number of nodes, the
+//! global view, the subtree views, one plane per branch, one plane per fork with its node. Numbers are written
+//! with the fewest digits that read back as the same `f64`, so a file gives the very hierarchy it was written from.
+//! A file is read for the tree it was made for, and for no other.
 
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
@@ -65,6 +66,8 @@ pub struct LocalPlane {
 /// node, which is `Some` exactly where the node has two or more children.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewHierarchy {
+    /// The digest of its tree: [`Tree::digest`].
+    pub tree: String,
     /// The best view of the whole tree.
     pub global: View,
     /// The best view of each subtree below a branching node that branches again, level by level, in preorder
@@ -90,6 +93,7 @@ impl ViewHierarchy {
                 fork.map(|plane| ForkRecord { node, plane: PlaneRecord::of(&plane) })
             });
         let file = ViewsFile {
+            tree: self.tree.clone(),
             space: SPACE.to_owned(),
             n_nodes: self.forks.len(),
             global: ViewRecord::of(&self.global),
@@ -103,9 +107,11 @@ impl ViewHierarchy {
     /// The hierarchy of `tree` from its file.
     ///
     /// # Errors
-    /// [`FileError`] if the text is no `views.json` of this version, or breaks a guarantee for this tree.
+    /// [`FileError`] if the text is no `views.json` of this version, was made for another tree, or breaks a
+    /// guarantee.
     pub fn from_json(text: &str, tree: &Tree) -> Result<Self, FileError> {
         let file: ViewsFile = versioned::from_json(FORMAT, VERSION, text)?;
+        versioned::check_tree(FORMAT, &file.tree, tree)?;
         file.check(tree).map_err(|what| FileError::Invalid { format: FORMAT, what })?;
         let subtrees = file.subtrees.iter().map(|record| SubtreeView {
             level: record.level,
@@ -117,6 +123,7 @@ impl ViewHierarchy {
             forks[record.node] = Some(record.plane.plane());
         }
         Ok(Self {
+            tree: file.tree,
             global: file.global.view(),
             subtrees: subtrees.collect(),
             chains: file.chains.iter().map(PlaneRecord::plane).collect(),
@@ -134,6 +141,7 @@ const AXIS_TOLERANCE: f64 = 1e-9;
 
 #[derive(Serialize, Deserialize)]
 struct ViewsFile {
+    tree: String,
     space: String,
     n_nodes: usize,
     global: ViewRecord,
@@ -297,6 +305,7 @@ mod tests {
         };
         let plane = LocalPlane { view, is_mirrored: true };
         ViewHierarchy {
+            tree: fork_tree().digest(),
             global: view,
             subtrees: vec![SubtreeView { level: 0, root: 0, view }],
             chains: vec![plane; 3],
@@ -348,6 +357,16 @@ mod tests {
             assert!(message.contains(expected), "{message} should say {expected}");
         }
         assert!(ViewHierarchy::from_json("", &fork_tree()).is_err());
+    }
+
+    #[test]
+    fn file_of_another_tree_of_the_same_shape_is_refused() {
+        let mut nodes = fork_tree().nodes().to_vec();
+        nodes[3].position_mm.x += 1e-12;
+        let other = Tree::new(&nodes).expect("a tree");
+        let error = ViewHierarchy::from_json(&sample().to_json(), &other).expect_err("refused");
+        assert!(matches!(&error, FileError::OtherTree { expected, .. } if *expected == other.digest()));
+        assert!(error.to_string().contains("was made for another tree"), "{error}");
     }
 
     #[test]

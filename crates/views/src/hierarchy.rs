@@ -67,6 +67,7 @@ pub(crate) fn views_of_parts(
         + chains.iter().chain(forks.iter().flatten()).map(|sought| sought.n_evaluations).sum::<u64>();
     let first = SubtreeView { level: 0, root: 0, view: global };
     let hierarchy = ViewHierarchy {
+        tree: tree.digest(),
         global,
         subtrees: std::iter::once(first).chain(subtrees.into_iter().map(|sought| sought.found)).collect(),
         chains: chains.into_iter().map(|sought| sought.found).collect(),

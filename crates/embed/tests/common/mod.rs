@@ -95,6 +95,7 @@ pub(crate) fn views_along(tree: &Tree, towards_camera: DVec3) -> ViewHierarchy {
     let view = View { towards_camera, up, center_mm: DVec3::ZERO, radius_mm: tree.extent_mm(), loss: 0.0 };
     let plane = LocalPlane { view, is_mirrored: false };
     ViewHierarchy {
+        tree: tree.digest(),
         global: view,
         subtrees: vec![SubtreeView { level: 0, root: 0, view }],
         chains: vec![plane; tree.branches().list().len()],

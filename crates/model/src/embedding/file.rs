@@ -49,9 +49,11 @@ impl Embedding {
     /// The embedding of `tree` in a text of `embedding.json`.
     ///
     /// # Errors
-    /// [`FileError`] if the text is not such a file, or not of this tree, or breaks a guarantee.
+    /// [`FileError`] if the text is not such a file, was made for another tree, or breaks a guarantee. The
+    /// certificate is not made again here: `espalier_embed::certify` does that.
     pub fn from_json(text: &str, tree: &Tree) -> Result<Self, FileError> {
         let file: EmbeddingFile = versioned::from_json(FORMAT, VERSION, text)?;
+        versioned::check_tree(FORMAT, &file.tree, tree)?;
         check(&file, tree.n_nodes()).map_err(|what| FileError::Invalid { format: FORMAT, what })?;
         Ok(file.into())
     }
@@ -160,6 +162,7 @@ fn decimals(quantum_mm: f64) -> usize {
 
 #[derive(Serialize, Deserialize)]
 struct EmbeddingFile {
+    tree: String,
     method: String,
     seed: u64,
     targets: TargetsFile,
@@ -312,6 +315,7 @@ fn check_column(name: &str, values: &[f64], n_expected: usize) -> Result<(), Str
 impl From<&Embedding> for EmbeddingFile {
     fn from(embedding: &Embedding) -> Self {
         Self {
+            tree: embedding.tree.clone(),
             method: embedding.method.clone(),
             seed: embedding.seed,
             targets: (&embedding.targets).into(),
@@ -339,6 +343,7 @@ impl From<&Embedding> for EmbeddingFile {
 impl From<EmbeddingFile> for Embedding {
     fn from(file: EmbeddingFile) -> Self {
         Self {
+            tree: file.tree,
             method: file.method,
             seed: file.seed,
             positions_mm: file.positions_mm.into_iter().map(DVec2::from_array).collect(),
@@ -469,6 +474,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
+    use crate::diagnose::Diagnose;
     use crate::tree::Node;
 
     fn sample() -> (Tree, Embedding) {
@@ -484,6 +490,7 @@ mod tests {
             targets: TargetKind::Projected,
         };
         let embedding = Embedding {
+            tree: tree.digest(),
             method: "radial".to_owned(),
             seed: u64::MAX,
             positions_mm: vec![DVec2::ZERO, DVec2::new(0.333_3, -0.000_1)],
@@ -538,6 +545,20 @@ mod tests {
             let message = refusal(change);
             assert!(message.contains(expected), "{message}");
         }
+    }
+
+    #[test]
+    fn another_tree_of_the_same_shape_is_refused() {
+        let (tree, embedding) = sample();
+        let mut nodes = tree.nodes().to_vec();
+        nodes[1].radius_mm = 1.000_000_1;
+        let other = Tree::new(&nodes).expect("a tree");
+        let error = Embedding::from_json(&embedding.to_json(), &other).expect_err("refused");
+        assert!(matches!(&error, FileError::OtherTree { found, .. } if *found == tree.digest()));
+        assert!(error.to_string().contains("was made for another tree"), "{error}");
+        assert!(error.hint().contains("for this tree"), "{}", error.hint());
+        let anonymous = embedding.to_json().replacen("\"tree\":", "\"root\":", 1);
+        assert!(matches!(Embedding::from_json(&anonymous, &tree), Err(FileError::Malformed { .. })));
     }
 
     #[test]

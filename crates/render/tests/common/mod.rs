@@ -34,6 +34,7 @@ pub(crate) fn flat(tree: &Tree) -> Embedding {
         confidence: vec![1.0; n_nodes],
     };
     Embedding {
+        tree: tree.digest(),
         method: "by hand".to_owned(),
         seed: 0,
         positions_mm,
@@ -59,6 +60,7 @@ pub(crate) fn front(tree: &Tree) -> ViewHierarchy {
     let branches = tree.branches();
     let plane = LocalPlane { view: global, is_mirrored: false };
     ViewHierarchy {
+        tree: tree.digest(),
         global,
         subtrees: vec![SubtreeView { level: 0, root: 0, view: global }],
         chains: vec![plane; branches.list().len()],
