@@ -185,11 +185,11 @@ impl Diagnose for ReadError {
             Self::Format { way_out, .. } => way_out,
             Self::Field { .. } => "write the file again with a program that checks its headers",
             Self::NotScalar { .. } => "convert the volume to one number a voxel",
-            Self::FourDimensional { .. } => "choose one with --volume-index, counted from 0",
-            Self::VolumeIndex { .. } => "choose another with --volume-index",
-            Self::NoSpace { .. } => "say which with --assume-space ras, las or lps",
+            Self::FourDimensional { .. } => "choose one, counted from 0: `--set input.volume_index=0`, or `volume_index = 0` under [input]",
+            Self::VolumeIndex { .. } => "choose another: `--set input.volume_index=0`, or `volume_index = 0` under [input]",
+            Self::NoSpace { .. } => "say which: `--set input.assume_space=ras`, or las or lps, or `assume_space` under [input]",
             Self::Grid { problem: GridError::Sheared { .. }, .. } => {
-                "without --strict the volume is resampled to orthogonal axes"
+                "with `--set input.strict=false`, the default, the volume is resampled to orthogonal axes"
             }
             Self::Form { .. } | Self::Grid { .. } => {
                 "set sform or qform right in the program that made the file"

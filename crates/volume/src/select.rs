@@ -77,8 +77,9 @@ fn labels_need_one(values: &[f64]) -> Error {
     Error::MethodNeeded {
         found: format!("the volume holds {} whole values, like a label map", values.len()),
         way_out: format!(
-            "set volume.label (--label) to one of {listed}{more}; for a scan set volume.method to \
-             \"region-grow\" or \"threshold\""
+            "set volume.label to one of {listed}{more}, as in --set volume.label={}; for a scan set volume.method to \
+             \"region-grow\" or \"threshold\"",
+            labels.first().map_or("1", String::as_str)
         ),
     }
 }

@@ -118,7 +118,7 @@ fn scans_and_label_maps_need_a_method() {
     let Kind::Labels { values } = inspect_kind(&labels.volume) else { panic!("not a label map") };
     assert_eq!(values.len(), 42);
     let error = segment(&labels.volume, &Params::default()).expect_err("a label map needs a label");
-    assert!(error.hint().contains("--label"), "{}", error.hint());
+    assert!(error.hint().contains("as in --set volume.label=1;"), "{}", error.hint());
     let params = Params { label: Some(117.0), components: Components::All, ..Params::default() };
     assert!(segment(&labels.volume, &params).expect("label 117").mask.n_foreground() > 0);
     let error =
