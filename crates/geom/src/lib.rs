@@ -7,6 +7,7 @@
 //! | [`plane`] | planar segments: exact crossing test, distances |
 //! | [`space`] | segments and directions in three dimensions |
 //! | [`random`] | counter-based random streams (Philox4x32-10) |
+//! | [`union_find`] | disjoint sets |
 //!
 //! **Spaces** Points in the world are RAS+ in mm, `f64`. Points in the picture are plane mm, x to the right,
 //! y up. A transform is named `target_from_source`.
@@ -16,3 +17,4 @@ pub mod math;
 pub mod plane;
 pub mod random;
 pub mod space;
+pub mod union_find;

@@ -50,6 +50,14 @@ pub fn half_sphere(count: usize) -> impl Iterator<Item = DVec3> {
     })
 }
 
+/// Half the diagonal of the box around the points: how far one can be from its centre. 0 for no point.
+#[must_use]
+pub fn extent(points: impl Iterator<Item = DVec3>) -> f64 {
+    let (low, high) = points
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), point| (low.min(point), high.max(point)));
+    if low.cmpgt(high).any() { 0.0 } else { 0.5 * (high - low).length() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -220,12 +220,10 @@ impl Tree {
         (1..self.n_nodes()).filter(|&node| self.children(node).is_empty()).count()
     }
 
-    /// The largest distance of a node from the centre of the tree's bounding box, in mm: a scale for tolerances.
+    /// Half the diagonal of the tree's bounding box, in mm: a scale for tolerances.
     #[must_use]
     pub fn extent_mm(&self) -> f64 {
-        let low = self.nodes.iter().fold(DVec3::INFINITY, |low, node| low.min(node.position_mm));
-        let high = self.nodes.iter().fold(DVec3::NEG_INFINITY, |high, node| high.max(node.position_mm));
-        0.5 * (high - low).length()
+        espalier_geom::space::extent(self.nodes.iter().map(|node| node.position_mm))
     }
 
     /// The branches of the tree.

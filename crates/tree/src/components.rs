@@ -6,12 +6,12 @@
 //! prefer one blob to a whole vessel tree. Ties: the component with the lower hub index.
 //! **Cost** O(N α(N)).
 
+use espalier_geom::union_find::UnionFind;
 use espalier_model::{Ledger, LedgerEntry, LedgerKind};
 
 use crate::Error;
 use crate::graph::{Graph, Hub, Piece};
 use crate::params::{Components, Params};
-use crate::union_find::UnionFind;
 
 struct Component {
     length_mm: f64,

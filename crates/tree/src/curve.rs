@@ -1,4 +1,4 @@
-//! Polylines of samples: arc lengths, even spacing, straight fits.
+//! Polylines of samples: arc lengths, even spacing, calibres, straight fits.
 
 use glam::DVec3;
 
@@ -26,7 +26,7 @@ pub(crate) fn between(a: Sample, b: Sample, share: f64) -> Sample {
 }
 
 /// The same curve with `n_edges` (at least 1) edges of equal arc length; both ends stay. The number of edges is
-/// bounded by the caller's grid, never by a file's coordinates alone.
+/// for the caller to bound; where the curve comes back on itself, samples may lie at one place.
 pub(crate) fn evenly_spaced(polyline: &[Sample], n_edges: usize) -> Vec<Sample> {
     let arcs = arc_lengths_mm(polyline);
     let (Some(&first), Some(&last)) = (polyline.first(), polyline.last()) else { return Vec::new() };
@@ -45,6 +45,19 @@ pub(crate) fn evenly_spaced(polyline: &[Sample], n_edges: usize) -> Vec<Sample> 
     }
     even.push(last);
     even
+}
+
+/// A sphere reaches a tip if the tip is at most this multiple of its radius away: the cap, and a voxel beyond.
+const REACH: f64 = 1.25;
+
+/// The calibre of a tip, in mm: the radius of the largest sphere on its branch that reaches it. The tip's own sphere is
+/// small wherever a skeleton ends near the surface.
+pub(crate) fn calibre_mm(branch: &[Sample], tip: Sample) -> f64 {
+    branch
+        .iter()
+        .filter(|s| s.position_mm.distance(tip.position_mm) <= REACH * s.radius_mm)
+        .map(|s| s.radius_mm)
+        .fold(tip.radius_mm, f64::max)
 }
 
 /// A straight line fitted to a stretch of a curve.

@@ -49,7 +49,6 @@ mod smooth;
 mod summary;
 mod tips;
 mod traced;
-mod union_find;
 
 use espalier_model::swc::Traced;
 use espalier_model::{InscribedSpheres, Ledger, LedgerEntry, LedgerKind, Mask, Node, Report, Skeleton, Tree};
@@ -195,11 +194,11 @@ fn finish(
     nodes: &[Node],
     kind: Resample,
     params: &Params,
-    ledger: Ledger,
+    mut ledger: Ledger,
     mut report: Report,
 ) -> Result<Built, Error> {
     let dense = Tree::new(nodes)?;
-    let tree = Tree::new(&resample::resample(&dense, kind, params))?;
+    let tree = Tree::new(&resample::resample(&dense, kind, params, &mut ledger))?;
     summary::describe(&tree, &ledger, &mut report);
     Ok(Built { tree, ledger, report })
 }

@@ -4,8 +4,9 @@
 //! loses all but two of its pieces, it dissolves and its two runs become one; that is a union of sets, so even a comb
 //! of very many teeth is pruned in nearly linear time.
 
+use espalier_geom::union_find::UnionFind;
+
 use crate::graph::{Graph, Sample};
-use crate::union_find::UnionFind;
 
 /// The pieces between two hubs that are tips or forks now.
 #[derive(Clone, Copy, Debug)]

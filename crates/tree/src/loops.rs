@@ -11,12 +11,12 @@
 //! be rid of the second.
 //! **Cost** O(P log P + N) in pieces and samples.
 
+use espalier_geom::union_find::UnionFind;
 use espalier_model::{Ledger, LedgerEntry, LedgerKind};
 
 use crate::Error;
 use crate::graph::{Graph, Hub, Piece, Sample, polyline_length_mm};
 use crate::params::{Loops, Params};
-use crate::union_find::UnionFind;
 
 /// Opens every loop; also returns how many there were.
 ///

@@ -4,19 +4,21 @@
 //! parent stays, takes over the children and the larger radius; a ledger entry for each merge.
 //! **Cost** O(N).
 
+use espalier_geom::space::extent;
 use espalier_model::{Ledger, LedgerEntry, LedgerKind, Node};
-use glam::DVec3;
 
 /// Edges shorter than this share of the tree's extent have no direction worth keeping.
 const SHARE_OF_EXTENT: f64 = 1e-6;
 
-/// Collapses all edges not longer than 1e-6 of the extent. Nodes that no root leads to are dropped; there are none in
+/// The length in mm up to which an edge has no direction.
+pub(crate) fn tolerance_mm(nodes: &[Node]) -> f64 {
+    SHARE_OF_EXTENT * extent(nodes.iter().map(|node| node.position_mm))
+}
+
+/// Collapses all edges not longer than [`tolerance_mm`]. Nodes that no root leads to are dropped; there are none in
 /// what the callers give.
 pub(crate) fn merge_near(nodes: &[Node], ledger: &mut Ledger) -> Vec<Node> {
-    let low = nodes.iter().fold(DVec3::INFINITY, |low, node| low.min(node.position_mm));
-    let high = nodes.iter().fold(DVec3::NEG_INFINITY, |high, node| high.max(node.position_mm));
-    let tolerance_mm = SHARE_OF_EXTENT * 0.5 * (high - low).length();
-
+    let tolerance_mm = tolerance_mm(nodes);
     let mut merged: Vec<Node> = Vec::with_capacity(nodes.len());
     let mut new_index = vec![usize::MAX; nodes.len()];
     for node_idx in parents_first(nodes) {

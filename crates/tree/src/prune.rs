@@ -3,8 +3,9 @@
 //! **Input** a graph without cycles. **Output** the same without spurs; a ledger entry for each.
 //! **Steps** 1. A terminal branch is a spur if it is shorter than `prune_factor` × the radius at its fork, or than
 //! `prune_min_mm`; or if it winds, being less than twice that long, without getting that far from its fork. A stub
-//! of an opened loop must be `STUB_FACTOR` times as long to stay: most of them are holes in a wall. 2. Take the shortest spur away. 3. If two branches are left at its fork, they are one branch now,
-//! with their joint length. 4. Again, until there is no spur.
+//! of an opened loop must be `STUB_FACTOR` times as long to stay: most of them are holes in a wall. 2. Take the
+//! shortest spur away. 3. If two branches are left at its fork, they are one branch now, with their joint length.
+//! 4. Again, until there is no spur.
 //! **Guarantees** at least two branches stay at every fork that was one; protected tips stay; the result does not
 //! depend on the order of the voxels but for exact ties, which go to the lower hub index.
 //! **Cost** O(B log B) in branches.

@@ -2,11 +2,10 @@
 //!
 //! **Input** the tree of pieces, before pruning for the protected tips and after it for the choice. **Output** a tip,
 //! and the runner-up.
-//! **Policies** `thickest-tip`: the tip of the largest calibre; `superior`: the tip whose organ reaches highest, by the
-//! third RAS coordinate of its end plus its calibre, since a thick branch's skeleton ends that much earlier; a point given by the user: the tip nearest to it. Ties go to the lower hub index; stubs of opened
-//! loops are chosen only if there is nothing else.
-//! **Calibre** A tip's own sphere is small wherever a skeleton ends near the surface, so the calibre of a tip is the
-//! radius of the largest sphere on its branch that reaches it.
+//! **Policies** `thickest-tip`: the tip of the largest calibre (see [`calibre_mm`]); `superior`: the tip whose organ
+//! reaches highest, by the third RAS coordinate of its end plus its calibre, since a thick branch's skeleton ends that
+//! much earlier; a point given by the user: the tip nearest to it. Ties go to the lower hub index; stubs of opened loops
+//! are chosen only if there is nothing else.
 //! **Why two times?** Spurs are no roots, so the choice comes after pruning; but a trunk can be so short that it
 //! looks like a spur. So what the user's policy points at is protected from pruning, and so is a tip where the
 //! scan's border cuts a vessel off at more than half of its fork's radius: no spur ends that way.
@@ -15,11 +14,10 @@ use std::cmp::Ordering;
 
 use glam::DVec3;
 
+use crate::curve::calibre_mm;
 use crate::living::Living;
 use crate::params::{Params, Root};
 
-/// A sphere reaches a tip if the tip is at most this multiple of its radius away: the cap, and a voxel beyond.
-const REACH: f64 = 1.25;
 /// A vessel cut off by the border of the scan is no spur if its sphere has at least this share of its fork's radius.
 const CUT_OFF_SHARE: f64 = 0.5;
 
@@ -52,8 +50,8 @@ pub(crate) fn choose(living: &Living<'_>, params: &Params) -> Choice {
     let hubs = &living.graph.hubs;
     let score = |tip: usize| match (params.root_mm, params.root) {
         (Some(point), _) => -hubs[tip].sample.position_mm.distance(DVec3::from_array(point)),
-        (None, Root::Superior) => hubs[tip].sample.position_mm.z + calibre_mm(living, tip),
-        (None, Root::ThickestTip) => calibre_mm(living, tip),
+        (None, Root::Superior) => hubs[tip].sample.position_mm.z + tip_calibre_mm(living, tip),
+        (None, Root::ThickestTip) => tip_calibre_mm(living, tip),
     };
     let mut ranked: Vec<(bool, f64, usize)> =
         living.tips().into_iter().map(|tip| (hubs[tip].is_stub, score(tip), tip)).collect();
@@ -65,14 +63,10 @@ fn better_first(a: (bool, f64, usize), b: (bool, f64, usize)) -> Ordering {
     a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)).then(a.2.cmp(&b.2))
 }
 
-/// The radius of the largest sphere on the branch of a tip that reaches the tip, in mm.
-fn calibre_mm(living: &Living<'_>, tip: usize) -> f64 {
+/// The calibre of a tip, in mm.
+fn tip_calibre_mm(living: &Living<'_>, tip: usize) -> f64 {
     let sample = living.graph.hubs[tip].sample;
     let Some(piece) = living.pieces_at(tip).next() else { return sample.radius_mm };
     let (branch, ..) = living.branch_from(tip, piece);
-    branch
-        .iter()
-        .filter(|s| s.position_mm.distance(sample.position_mm) <= REACH * s.radius_mm)
-        .map(|s| s.radius_mm)
-        .fold(sample.radius_mm, f64::max)
+    calibre_mm(&branch, sample)
 }

@@ -4,11 +4,11 @@
 //!
 //! **Input** [`Outline`] with evenly spaced lines. **Output** the same, its free ends (tips and the root) moved along
 //! their tangents; a ledger entry for each that became longer.
-//! **Steps** 1. The end sphere is the outermost one that has nearly the calibre of the tip; what lies beyond it follows
-//! the surface and is dropped. 2. Fit a straight line to the stretch inside of it: the tangent, on which the end
-//! is set. 3. See how far the mask goes on along the tangent, at most to twice the radius of the end sphere. 4. `sphere`:
-//! the end is one radius before that; `surface`: there, at most one radius beyond the end sphere; at the border
-//! of the scan both are the border.
+//! **Steps** 1. The end sphere is the outermost one that has nearly the calibre of the tip; what lies beyond it
+//! follows the surface and is dropped. 2. Fit a straight line to the stretch inside of it: the tangent, on which
+//! the end is set. 3. See how far the mask goes on along the tangent, at most to twice the radius of the end sphere.
+//! 4. `sphere`: the end is one radius before that; `surface`: there, at most one radius beyond the end sphere; at the
+//! border of the scan both are the border.
 //! **Which end is true?** A tube cut across and one with a round end have the same last sphere, one radius before the
 //! end of the mask, and the round cones by which a tree stands for its organ add that radius again.
 //! **Left alone** stubs of opened loops: they are no ends of the organ.
@@ -21,14 +21,12 @@ use espalier_geom::space::plane_axes;
 use espalier_model::{Ledger, LedgerEntry, LedgerKind, Mask};
 use glam::DVec3;
 
-use crate::curve::{arc_lengths_mm, fit_line};
+use crate::curve::{arc_lengths_mm, calibre_mm, fit_line};
 use crate::graph::Sample;
 use crate::mask_walk::{free_length_mm, leaves_scan};
 use crate::outline::Outline;
 use crate::params::Tips;
 
-/// A sphere reaches a tip if the tip is at most this multiple of its radius away.
-const REACH: f64 = 1.25;
 /// The end sphere has at least this share of the calibre of the tip.
 const NEARLY: f64 = 0.9;
 /// The length of the stretch that gives the tangent, in calibres.
@@ -97,11 +95,7 @@ fn moved(inwards: &[Sample], mask: &Mask, tips: Tips) -> Option<Moved> {
     let arcs = arc_lengths_mm(inwards);
     let droppable_mm = MAX_DROPPED * arcs.last()?;
     let tip = inwards[0];
-    let calibre_mm = inwards
-        .iter()
-        .filter(|s| s.position_mm.distance(tip.position_mm) <= REACH * s.radius_mm)
-        .map(|s| s.radius_mm)
-        .fold(tip.radius_mm, f64::max);
+    let calibre_mm = calibre_mm(inwards, tip);
     let end = inwards.iter().position(|s| s.radius_mm >= NEARLY * calibre_mm)?;
     let end = if arcs[end] <= droppable_mm { end } else { 0 };
 
@@ -132,9 +126,9 @@ fn moved(inwards: &[Sample], mask: &Mask, tips: Tips) -> Option<Moved> {
 
 /// How far the mask goes on from a point along its axis, in mm, given how far it does on the axis itself.
 ///
-/// That one ray alone is wrong by up to a voxel. So there are rays beside it, and their ends are fitted by h = h₀ − c R x,
-/// x = (ρ/R)² for the distance ρ from the axis: c is 0 for a flat end and near ½ for a round one. Thick slices cannot
-/// tell which, so c stays in `CAP`.
+/// That one ray alone is wrong by up to a voxel. So there are rays beside it, and their ends are fitted by
+/// h = h₀ − c R x, x = (ρ/R)² for the distance ρ from the axis: c is 0 for a flat end and near ½ for a round one.
+/// Thick slices cannot tell which, so c stays in `CAP`.
 fn free_end_mm(mask: &Mask, (on_axis, on_axis_mm): (DVec3, f64), outwards: DVec3, radius_mm: f64) -> f64 {
     let limit_mm = LOOK_AHEAD * radius_mm;
     let (right, up) = plane_axes(outwards, DVec3::Z);

@@ -1,9 +1,10 @@
 //! Traced structures: roots, duplicates, radii, and resampling.
 
+use espalier_geom::random::{Purpose, Stream};
 use espalier_model::diagnose::Class;
 use espalier_model::swc::{Traced, TracedNode};
 use espalier_model::{Diagnose, LedgerKind};
-use espalier_tree::{Error, MissingRadii, Params, Resample, Roots, from_traced};
+use espalier_tree::{Built, Error, MissingRadii, Params, Resample, Roots, from_traced};
 use glam::DVec3;
 
 /// Nodes on the x axis and off it: (x, y, radius, parent).
@@ -60,6 +61,77 @@ fn shape_keeps_corners_and_steps_of_radius() {
     // The second node errs by 0.025 mm, below a tenth of the radius.
     let x_y: Vec<_> = tree.nodes().iter().map(|n| (n.position_mm.x, n.position_mm.y)).collect();
     assert_eq!(x_y, [(0.0, 0.0), (10.0, 0.05), (10.0, 5.0), (10.0, 10.0), (10.0, 15.0)]);
+}
+
+/// A branch out to x = 2 µm and back.
+fn fold_back(radius_mm: f64) -> Traced {
+    let way = [0.0, 0.001, 0.002, 0.001, 0.0];
+    let node = |(i, x): (usize, f64)| (x, 0.0, radius_mm, i.checked_sub(1));
+    traced(&way.into_iter().enumerate().map(node).collect::<Vec<_>>())
+}
+
+#[test]
+fn a_branch_that_comes_back_keeps_its_turn_and_no_edge_without_length() {
+    let xs = |built: &Built| built.tree.nodes().iter().map(|n| n.position_mm.x).collect::<Vec<_>>();
+    let resampled = |resample, step_mm, radius_mm| {
+        let params = Params { resample, step_mm, ..Params::default() };
+        from_traced(&fold_back(radius_mm), &params).expect("a tree")
+    };
+    // Steps of 4/3 µm put two samples at one place on the way out and the way back.
+    let thirds = resampled(Resample::Step, 0.001_333_3, 1e-4);
+    assert_eq!((thirds.tree.n_nodes(), thirds.ledger.n_of(LedgerKind::NodesMerged)), (3, 1));
+    assert!(thirds.ledger.0[0].length_mm < 1e-12 && xs(&thirds)[1] > 0.001_333);
+    // One step, or a radius beside which the way is nothing: only the ends would be left, at one place.
+    for built in [resampled(Resample::Step, 1.0, 1e-4), resampled(Resample::Shape, 1.0, 1.0)] {
+        assert_eq!(xs(&built), [0.0, 0.002, 0.0]);
+        assert!(built.ledger.0.is_empty());
+    }
+    let kept = resampled(Resample::None, 1.0, 1.0);
+    assert_eq!((kept.tree.n_nodes(), kept.ledger.0.len()), (5, 0));
+}
+
+#[test]
+fn random_walks_on_a_lattice_have_no_edge_without_length() {
+    let mut stream = Stream::new(1, Purpose::Test, 0, 0);
+    for _ in 0..200 {
+        let n_nodes = 2 + stream.below(30) as usize;
+        let mut nodes = vec![(0.0, 0.0, 0.1, None)];
+        for i in 1..n_nodes {
+            let parent = i - 1 - stream.below(2.min(i as u32)) as usize;
+            let (x, y, ..) = nodes[parent];
+            let step = if stream.below(2) == 0 { 1.0 } else { -1.0 };
+            let (dx, dy) = if stream.below(2) == 0 { (step, 0.0) } else { (0.0, step) };
+            nodes.push((x + dx, y + dy, stream.uniform(0.0, 30.0), Some(parent)));
+        }
+        for resample in [Resample::Step, Resample::Shape] {
+            for step_mm in [0.25, 0.7, 4.0 / 3.0, 2.0, 100.0] {
+                let params = Params { resample, step_mm, ..Params::default() };
+                let tree = from_traced(&traced(&nodes), &params).expect("a tree").tree;
+                let least_mm = 1e-7 * tree.extent_mm();
+                assert!((1..tree.n_nodes()).all(|node| tree.edge_length_mm(node) > least_mm), "{nodes:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_smallest_structures_are_trees() {
+    let point = [(1.0, 1.0, 2.0, None)];
+    let edge = [(1.0, 1.0, 2.0, None), (1.0, 1.001, 2.0, Some(0))];
+    let one_place = [(1.0, 1.0, 2.0, None), (1.0, 1.0, 2.0, Some(0)), (1.0, 1.0, 3.0, Some(0))];
+    for resample in [Resample::Auto, Resample::Shape, Resample::Step, Resample::None] {
+        let params = Params { resample, ..Params::default() };
+        let n_nodes = |nodes: &[_]| from_traced(&traced(nodes), &params).expect("a tree").tree.n_nodes();
+        assert_eq!((n_nodes(&point), n_nodes(&edge), n_nodes(&one_place)), (1, 2, 1), "{resample:?}");
+    }
+}
+
+#[test]
+fn a_tiny_step_does_not_eat_the_memory() {
+    let star: Vec<_> = (0..50).map(|i| (f64::from(i), 1.0, 1.0, (i > 0).then_some(0))).collect();
+    let params = Params { resample: Resample::Step, step_mm: 1e-9, ..Params::default() };
+    let n_nodes = from_traced(&traced(&star), &params).expect("a tree").tree.n_nodes();
+    assert!((900_000..1_100_000).contains(&n_nodes), "{n_nodes}");
 }
 
 #[test]

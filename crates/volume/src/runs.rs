@@ -8,6 +8,8 @@
 //! **Guarantees** the numbering depends on the voxels only.
 //! **Cost** O(voxels + R · α(R)) time, O(R + rows) memory: a label for every voxel would take four times the mask.
 
+use espalier_geom::union_find::UnionFind;
+
 /// How voxels connect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Connectivity {
@@ -47,7 +49,7 @@ pub(crate) fn label(
     connectivity: Connectivity,
 ) -> Labelled {
     let (runs, row_starts) = cut_rows(voxels, nx, value);
-    let mut joined = Joined::new(runs.len());
+    let mut joined = UnionFind::new(runs.len());
     for z in 0..nz {
         for y in 0..ny {
             let row = z * ny + y;
@@ -61,7 +63,7 @@ pub(crate) fn label(
             }
         }
     }
-    let (component, n_components) = joined.number();
+    let (component, n_components) = joined.into_numbers();
     Labelled { runs, component, n_components }
 }
 
@@ -98,7 +100,7 @@ fn join_touching(
     here: std::ops::Range<usize>,
     before: std::ops::Range<usize>,
     connectivity: Connectivity,
-    joined: &mut Joined,
+    joined: &mut UnionFind,
 ) {
     let reach = usize::from(connectivity == Connectivity::All);
     let (mut a, mut b) = (here.start, before.start);
@@ -108,40 +110,6 @@ fn join_touching(
         }
         // The run that ends first cannot touch anything further along.
         if runs[a].end < runs[b].end { a += 1 } else { b += 1 }
-    }
-}
-
-/// A union–find forest in which the smallest member is the root.
-struct Joined(Vec<usize>);
-
-impl Joined {
-    fn new(n: usize) -> Self {
-        Self((0..n).collect())
-    }
-
-    fn root(&mut self, mut member: usize) -> usize {
-        while self.0[member] != member {
-            self.0[member] = self.0[self.0[member]];
-            member = self.0[member];
-        }
-        member
-    }
-
-    fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.0[a.max(b)] = a.min(b);
-    }
-
-    /// The number of each member's set, by the order of the roots, and how many sets there are.
-    fn number(mut self) -> (Vec<usize>, usize) {
-        let mut number = vec![0; self.0.len()];
-        let mut n_sets = 0;
-        for member in 0..self.0.len() {
-            let root = self.root(member);
-            number[member] = if root == member { n_sets } else { number[root] };
-            n_sets += usize::from(root == member);
-        }
-        (number, n_sets)
     }
 }
 
