@@ -46,7 +46,20 @@ pub fn run(source: &Path, out: &Path, overrides: &[Override], threads: usize) ->
 /// # Errors
 /// As the run's.
 pub fn run_from(source: &Path, out: &Path, overrides: &[Override], from: Stage) -> Result<Summary, Error> {
-    espalier_pipeline::run(&Request { from: Some(from), ..request(source, out, overrides, 2)? }, &|_| {})
+    run_range(source, out, overrides, (Some(from), None))
+}
+
+/// As [`run`], from a stage to a stage.
+///
+/// # Errors
+/// As the run's.
+pub fn run_range(
+    source: &Path,
+    out: &Path,
+    overrides: &[Override],
+    (from, to): (Option<Stage>, Option<Stage>),
+) -> Result<Summary, Error> {
+    espalier_pipeline::run(&Request { from, to, ..request(source, out, overrides, 2)? }, &|_| {})
 }
 
 fn request(source: &Path, out: &Path, overrides: &[Override], threads: usize) -> Result<Request, Error> {

@@ -18,7 +18,7 @@ fn check(kind: &str, seed: u64, overrides: &[Override], files: &[(&str, &str)]) 
     all.extend(overrides.iter().cloned());
     let text = "[input]\nphantom = \"airway\"\n";
     let config = Config::parse(text, Path::new("test"), &all).expect("a config");
-    make_phantom(&config, folder.path()).expect("a phantom");
+    make_phantom(&config, folder.path(), None).expect("a phantom");
     for (made, fixture) in files {
         let made = fs::read(folder.path().join(made)).expect("made file");
         let fixture_bytes = fs::read(repository().join("fixtures").join(fixture)).expect("fixture");

@@ -1,17 +1,20 @@
 //! Same inputs, config and seed: the same bytes, whatever the threads, the folder, or where the run begins.
 #![allow(clippy::expect_used, reason = "a test says what it expects")]
 
+use std::fs;
 use std::path::{Path, PathBuf};
 
-use espalier_pipeline::Stage;
-use espalier_tests::{run, run_from, set, small_swarm};
+use espalier_model::Diagnose;
+use espalier_pipeline::{Override, Stage};
+use espalier_tests::{run, run_from, run_range, set, small_swarm};
+use tempfile::TempDir;
 
 fn pipelines() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../pipelines")
 }
 
 /// A small phantom, so that four runs of it are quick in a debug build.
-fn quick() -> Vec<espalier_pipeline::Override> {
+fn quick() -> Vec<Override> {
     let mut overrides = small_swarm();
     overrides.extend([set("phantom.spacing_mm", "[2.0, 2.0, 2.0]"), set("phantom.generations", 4)]);
     overrides
@@ -61,23 +64,98 @@ fn the_seed_matters() {
     assert_ne!(digest(1), digest(2));
 }
 
-#[test]
-fn an_altered_file_is_noticed_and_later_results_go_with_their_cause() {
+/// A neuron's run in a folder of its own.
+fn neuron_run(overrides: &[Override]) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("temporary folder");
     let config = pipelines().join("neuron.toml");
-    run(&config, folder.path(), &small_swarm(), 2).expect("a run");
+    run(&config, folder.path(), &with(overrides), 2).expect("a run");
+    (folder, config)
+}
+
+fn with(overrides: &[Override]) -> Vec<Override> {
+    small_swarm().into_iter().chain(overrides.iter().cloned()).collect()
+}
+
+/// The files that the folder vouches for, each checked to be there.
+fn vouched(folder: &Path) -> Vec<String> {
+    let sums = fs::read_to_string(folder.join("SHA256SUMS")).expect("SHA256SUMS");
+    let files: Vec<String> =
+        sums.lines().filter_map(|line| Some(line.split_once("  ")?.1.to_owned())).collect();
+    assert!(files.iter().all(|file| folder.join(file).is_file()), "a file is vouched for that is not there");
+    files
+}
+
+#[test]
+fn an_altered_file_is_noticed() {
+    let (folder, config) = neuron_run(&[]);
     let tree_file = folder.path().join("tree.swc");
-    let text = std::fs::read_to_string(&tree_file).expect("tree");
-    std::fs::write(&tree_file, text.replace(" 1\n", " 1 \n")).expect("write");
+    let text = fs::read_to_string(&tree_file).expect("tree");
+    fs::write(&tree_file, text.replacen("# unit mm", "# unit mm ", 1)).expect("write");
     let refusal =
         run_from(&config, folder.path(), &small_swarm(), Stage::Views).expect_err("an altered tree");
     assert!(refusal.to_string().contains("tree.swc"), "{refusal}");
+}
 
-    // Again from the tree stage on, with another tree: what came from the old one must not stay.
-    let mut coarser = small_swarm();
-    coarser.push(set("tree.resample", "shape"));
-    let mut request_to_tree = coarser.clone();
-    request_to_tree.push(set("seed", 7));
-    run(&config, folder.path(), &request_to_tree, 2).expect("a run");
-    assert!(folder.path().join("planar.png").exists());
+#[test]
+fn later_results_go_with_what_they_were_made_from() {
+    let (folder, config) = neuron_run(&[]);
+    let same = run_range(&config, folder.path(), &small_swarm(), (None, Some(Stage::Tree)));
+    assert!(same.is_ok() && folder.path().join("planar.png").exists(), "the same tree keeps its picture");
+
+    let coarser = with(&[set("tree.resample", "shape")]);
+    run_range(&config, folder.path(), &coarser, (None, Some(Stage::Tree))).expect("a run");
+    let files = vouched(folder.path());
+    assert!(files.contains(&"tree.swc".to_owned()));
+    for gone in ["views.json", "embedding.json", "planar.png"] {
+        assert!(
+            !files.contains(&gone.to_owned()) && !folder.path().join(gone).exists(),
+            "{gone} has outlived its tree"
+        );
+    }
+}
+
+#[test]
+fn a_run_that_fails_leaves_no_mixture() {
+    let (folder, config) = neuron_run(&[]);
+    let other = with(&[set("seed", 9), set("embed.memory_mib", 1), set("embed.particles", 100_000)]);
+    run(&config, folder.path(), &other, 2).expect_err("a swarm beyond its memory");
+    assert!(!folder.path().join("embedding.json").exists(), "an embedding of another tree");
+    let settings =
+        fs::read_to_string(folder.path().join("provenance/config.resolved.toml")).expect("settings");
+    assert!(settings.contains("seed = 9"));
+    assert!(vouched(folder.path()).contains(&"views.json".to_owned()));
+}
+
+#[test]
+fn a_run_from_the_middle_keeps_to_the_settings_it_builds_on() {
+    let (folder, config) = neuron_run(&[]);
+    for (key, value, stage) in [("tree.prune_factor", "9.0", "tree"), ("seed", "77", "phantom")] {
+        let refusal =
+            run_from(&config, folder.path(), &with(&[set(key, value)]), Stage::Embed).expect_err("refused");
+        assert!(
+            refusal.to_string().contains(key) && refusal.hint().contains(&format!("--from {stage}")),
+            "{refusal}"
+        );
+    }
+    run_from(&config, folder.path(), &with(&[set("embed.w_angle", 3)]), Stage::Embed).expect("a run");
+}
+
+#[test]
+fn another_input_leaves_nothing_of_the_former() {
+    let (folder, _) = neuron_run(&[]);
+    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/y.nii.gz");
+    let mixed = run(&fixture, folder.path(), &small_swarm(), 2).expect("a run").digest;
+    let fresh = tempfile::tempdir().expect("temporary folder");
+    assert_eq!(run(&fixture, fresh.path(), &small_swarm(), 2).expect("a run").digest, mixed);
+}
+
+#[test]
+fn the_way_a_path_is_typed_does_not_matter() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures");
+    let digest = |path: PathBuf, out: &str| {
+        run(&path, &folder.path().join(out), &small_swarm(), 2).expect("a run").digest
+    };
+    let detour = fixtures.join("../fixtures/neuron.swc");
+    assert_eq!(digest(fixtures.join("neuron.swc"), "direct"), digest(detour, "detour"));
 }

@@ -63,32 +63,62 @@ fn make_phantom(arguments: &Arguments, phantom: &PhantomArguments) -> anyhow::Re
     overrides.extend(arguments.common.overrides.iter().cloned());
     let text = "schema = 1\n[input]\nphantom = \"airway\"\n";
     let config = Config::parse(text, Path::new("command line"), &overrides).map_err(Error::from)?;
-    Ok(espalier_pipeline::make_phantom(&config, &phantom.out)?)
+    let threads = arguments.common.threads.map(usize::from);
+    Ok(espalier_pipeline::make_phantom(&config, &phantom.out, threads)?)
 }
 
 fn run_stage(arguments: &Arguments, stage: &StageArguments, which: Stage) -> anyhow::Result<Summary> {
-    let overrides = &arguments.common.overrides;
-    let run_config = stage.inputs[0].join("provenance/config.resolved.toml");
-    if stage.inputs[0].is_dir() && stage.inputs.len() == 1 {
-        let loaded = load(stage.config.as_ref().unwrap_or(&run_config), overrides)?;
-        let folder = &stage.inputs[0];
-        let out = stage.out.clone().unwrap_or_else(|| folder.clone());
-        let mut request = request(arguments, loaded, out);
-        if request.out != *folder {
-            request.files = which.reads().iter().map(|a| (*a, folder.join(a.file()))).collect();
-        }
-        return perform(arguments, &Request { from: Some(which), to: Some(which), ..request });
+    match stage.inputs.as_slice() {
+        [folder] if folder.is_dir() => run_stage_of_folder(arguments, stage, which, folder),
+        files => run_stage_on_files(arguments, stage, which, files),
     }
-    let files = stage_files(which, &stage.inputs)?;
+}
+
+/// A stage of a run folder, with the folder's own settings and files.
+fn run_stage_of_folder(
+    arguments: &Arguments,
+    stage: &StageArguments,
+    which: Stage,
+    folder: &Path,
+) -> anyhow::Result<Summary> {
+    let own_config = folder.join("provenance/config.resolved.toml");
+    let mut loaded = load(stage.config.as_ref().unwrap_or(&own_config), &arguments.common.overrides)?;
+    if let (None, Some(_)) = (&stage.config, &loaded.config.input.path) {
+        // The resolved config has only the name of the input; where it lies stands apart.
+        loaded.config.input.path = espalier_pipeline::input_of_run(folder).or(loaded.config.input.path);
+    }
+    let out = stage.out.clone().unwrap_or_else(|| folder.to_owned());
+    let mut request = Request { from: Some(which), to: Some(which), ..request(arguments, loaded, out) };
+    if request.out != folder {
+        let known = which.reads().iter().chain(&[Artifact::Traced]);
+        let files = known.map(|artifact| (*artifact, folder.join(artifact.file())));
+        request.files = files.filter(|(_, file)| file.exists()).collect();
+        if request.files.contains_key(&Artifact::Mask) {
+            request.files.remove(&Artifact::Traced);
+        }
+    }
+    perform(arguments, &request)
+}
+
+fn run_stage_on_files(
+    arguments: &Arguments,
+    stage: &StageArguments,
+    which: Stage,
+    inputs: &[PathBuf],
+) -> anyhow::Result<Summary> {
+    let overrides = &arguments.common.overrides;
+    let files = stage_files(which, inputs)?;
     let out = stage.out.clone().ok_or_else(|| anyhow!("{which} on files needs -o DIR"))?;
     let mut loaded = match &stage.config {
         Some(config) => load(config, overrides)?,
-        None => load_input(&stage.inputs[0], overrides)?,
+        None => load_input(&inputs[0], overrides)?,
     };
-    loaded.config.input.path = Some(std::path::absolute(&stage.inputs[0])?.to_string_lossy().into_owned());
+    loaded.config.input.path = Some(std::path::absolute(&inputs[0])?.to_string_lossy().into_owned());
     loaded.config.input.phantom = None;
-    let request = Request { files, from: Some(which), to: Some(which), ..request(arguments, loaded, out) };
-    perform(arguments, &request)
+    perform(
+        arguments,
+        &Request { files, from: Some(which), to: Some(which), ..request(arguments, loaded, out) },
+    )
 }
 
 /// Which file is which artifact.

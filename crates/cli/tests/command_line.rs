@@ -200,3 +200,27 @@ fn stages_on_their_own_equal_a_run() {
         digest(&first)
     );
 }
+
+/// Each stage of a run folder, in place and into another folder, from a file that lies elsewhere.
+#[test]
+fn stages_of_a_run_folder() {
+    let swc = "1 1 0 0 0 1 -1\n2 3 0 0 9 1 1\n3 3 4 0 15 1 2\n4 3 -4 1 15 1 2\n";
+    let folder = folder_with("n (1).swc", swc.as_bytes());
+    let run = |arguments: &[&str]| {
+        let output = espalier(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
+        String::from_utf8_lossy(&output.stdout).lines().last().map(str::to_owned)
+    };
+    let settings =
+        ["--set", "embed.particles=16", "--set", "embed.iterations=4", "--set", "render.width_px=300"];
+    let first = run(&[["run", "n (1).swc", "-o", "deep/down/run"].as_slice(), &settings].concat());
+    for stage in ["tree", "views", "embed", "render"] {
+        assert_eq!(run(&[stage, "deep/down/run"]), first, "{stage} in place");
+    }
+    for (stage, result) in [("tree", "tree.swc"), ("embed", "embedding.json"), ("render", "planar.png")] {
+        run(&[stage, "deep/down/run", "-o", stage]);
+        let [own, other] =
+            ["deep/down/run", stage].map(|run| fs::read(folder.path().join(run).join(result)).expect("file"));
+        assert!(own == other, "{stage} into another folder");
+    }
+}

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -59,7 +60,7 @@ impl Artifacts {
             return Ok((Arc::clone(traced), Report::default()));
         }
         let path = self.locate(Artifact::Traced, lookup)?;
-        let bytes = fs::read(&path).map_err(|source| Error::Read { path: path.clone(), source })?;
+        let bytes = self.read_bounded(&path)?;
         let scale = self.input.traced_scale(swc::is_own(&bytes));
         let (traced, report) = swc::parse(&bytes, &scale).map_err(|error| Error::file(&path, error))?;
         let traced = Arc::new(traced);
@@ -143,8 +144,20 @@ impl Artifacts {
             return Ok(known);
         }
         let path = self.locate(artifact, lookup)?;
-        let text = fs::read_to_string(&path).map_err(|source| Error::Read { path: path.clone(), source })?;
+        let not_text =
+            |_| Error::Read { path: path.clone(), source: io::Error::from(io::ErrorKind::InvalidData) };
+        let text = String::from_utf8(self.read_bounded(&path)?).map_err(not_text)?;
         parse(&text).map(Arc::new).map_err(|error| Error::file(&path, error))
+    }
+
+    /// The bytes of a file that is held in memory whole.
+    fn read_bounded(&self, path: &Path) -> Result<Vec<u8>, Error> {
+        let read = |source| Error::Read { path: path.to_owned(), source };
+        let (needed, limit) = (fs::metadata(path).map_err(read)?.len(), self.read_options.max_bytes);
+        if needed > limit {
+            return Err(Error::TooLarge { path: path.to_owned(), needed, limit });
+        }
+        fs::read(path).map_err(read)
     }
 
     fn read_volume(&self, path: &Path, stage: Stage) -> Result<espalier_volume::Loaded, Error> {

@@ -3,10 +3,11 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use espalier_model::diagnose::{Class, Diagnose};
+use espalier_model::diagnose::{Class, Diagnose, ParamError};
 use thiserror::Error;
 
 use crate::config::ConfigError;
+use crate::settings::Difference;
 use crate::stage::{Artifact, Stage};
 
 /// Why a run stopped.
@@ -58,6 +59,23 @@ pub enum Error {
         /// The stages there are.
         available: String,
     },
+    /// The input cannot be told.
+    #[error("input.{cause}")]
+    Input {
+        /// The key and what is wrong.
+        cause: ParamError,
+    },
+    /// `--from` would build on results made with other settings.
+    #[error(
+        "--from {from} builds on what is there, but {key} is {wanted} now, and {stage} was done with {kept}",
+        key = difference.key, wanted = difference.wanted, kept = difference.kept, stage = difference.stage
+    )]
+    OtherSettings {
+        /// The first stage to do.
+        from: Stage,
+        /// The setting.
+        difference: Box<Difference>,
+    },
     /// `--from` lies behind `--to`.
     #[error("--from {from} comes after --to {to}")]
     EmptyRange {
@@ -73,6 +91,16 @@ pub enum Error {
         path: PathBuf,
         /// What the system said.
         source: io::Error,
+    },
+    /// A file is larger than the memory allowed.
+    #[error("{path} has {needed} bytes, allowed are {limit}", path = path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its size in bytes.
+        needed: u64,
+        /// The most that reading a file may take, in bytes.
+        limit: u64,
     },
     /// An output cannot be created.
     #[error("cannot create {path}: {source}", path = path.display())]
@@ -124,7 +152,10 @@ impl Diagnose for Error {
             Self::MissingArtifact { .. } => "E-RUN-MISSING-FILE",
             Self::Altered { .. } => "E-RUN-ALTERED-FILE",
             Self::NoSuchStage { .. } | Self::EmptyRange { .. } => "E-RUN-STAGES",
+            Self::Input { .. } => "E-INPUT",
+            Self::OtherSettings { .. } => "E-RUN-SETTINGS",
             Self::Read { .. } => "E-IO-READ",
+            Self::TooLarge { .. } => "E-LIMIT-MEMORY",
             Self::Create { .. } => "E-IO-CREATE",
             Self::Write { .. } => "E-IO-WRITE",
             Self::Locked { .. } => "E-RUN-LOCKED",
@@ -136,9 +167,14 @@ impl Diagnose for Error {
         match self {
             Self::Config(error) => error.class(),
             Self::Stage { cause, .. } | Self::File { cause, .. } => cause.class(),
-            Self::NoSuchStage { .. } | Self::EmptyRange { .. } | Self::Threads { .. } => Class::Usage,
+            Self::NoSuchStage { .. }
+            | Self::EmptyRange { .. }
+            | Self::Input { .. }
+            | Self::OtherSettings { .. }
+            | Self::Threads { .. } => Class::Usage,
             Self::MissingArtifact { .. } | Self::Read { .. } | Self::Write { .. } => Class::Io,
             Self::Altered { .. } => Class::Uncertified,
+            Self::TooLarge { .. } => Class::Limit,
             Self::Create { .. } => Class::CannotCreate,
             Self::Locked { .. } => Class::Locked,
         }
@@ -157,6 +193,11 @@ impl Diagnose for Error {
             Self::Read { source, .. } if source.kind() == io::ErrorKind::NotFound => {
                 "check the path; a path in a config is relative to the config's own folder".to_owned()
             }
+            Self::OtherSettings { difference, .. } => {
+                format!("run with --from {}, or set {} back", difference.stage, difference.key)
+            }
+            Self::Input { .. } => "set it to the folder of the data".to_owned(),
+            Self::TooLarge { .. } => "allow more with --max-memory".to_owned(),
             Self::Create { .. } => "choose another folder with -o".to_owned(),
             Self::Write { .. } => "check the free space and the permissions of the folder".to_owned(),
             Self::Locked { .. } => "wait for it, or choose another folder with -o".to_owned(),

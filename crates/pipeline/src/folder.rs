@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 use atomic_write_file::AtomicWriteFile;
@@ -18,10 +18,8 @@ pub(crate) struct RunFolder {
     path: PathBuf,
     /// What `SHA256SUMS` says, by file.
     digests: BTreeMap<String, String>,
-    /// What it said when the folder was opened.
-    former_digests: BTreeMap<String, String>,
-    /// Whether this run made the folder.
-    is_new: bool,
+    /// The folders that this run made, the innermost first.
+    made: Vec<PathBuf>,
     /// The system releases the lock with the handle, however the process ends.
     _lock: File,
 }
@@ -30,7 +28,11 @@ impl RunFolder {
     /// Opens or makes the folder and takes its lock.
     pub(crate) fn open(path: &Path) -> Result<Self, Error> {
         let create = |source| Error::Create { path: path.to_owned(), source };
-        let is_new = !path.exists();
+        let made = path
+            .ancestors()
+            .take_while(|folder| !folder.as_os_str().is_empty() && !folder.exists())
+            .map(Path::to_owned)
+            .collect();
         fs::create_dir_all(path).map_err(create)?;
         let lock = File::create(path.join(LOCK_FILE)).map_err(create)?;
         match lock.try_lock() {
@@ -41,15 +43,15 @@ impl RunFolder {
             Err(TryLockError::Error(source)) => return Err(create(source)),
         }
         let digests = read_digests(&path.join(DIGEST_FILE));
-        Ok(Self { path: path.to_owned(), former_digests: digests.clone(), digests, is_new, _lock: lock })
+        Ok(Self { path: path.to_owned(), digests, made, _lock: lock })
     }
 
     /// Removes the folder if this run made it and has put nothing into it.
     pub(crate) fn remove_if_unused(&self) {
-        if self.is_new && self.digests.is_empty() {
-            // Only an empty folder can be removed, so nothing is lost where this fails.
+        if !self.made.is_empty() && self.digests.is_empty() {
+            // Only empty folders can be removed, so nothing is lost where this fails.
             let _ = fs::remove_file(self.path.join(LOCK_FILE));
-            let _ = fs::remove_dir(&self.path);
+            self.made.iter().take_while(|folder| fs::remove_dir(folder).is_ok()).for_each(drop);
         }
     }
 
@@ -57,20 +59,35 @@ impl RunFolder {
         &self.path
     }
 
-    /// Writes a result file, whole or not at all; tells whether it differs from what the folder had.
-    pub(crate) fn write(&mut self, relative: &str, bytes: &[u8]) -> Result<bool, Error> {
+    /// Writes a result file, whole or not at all.
+    pub(crate) fn write(&mut self, relative: &str, bytes: &[u8]) -> Result<(), Error> {
         self.write_aside(relative, bytes)?;
-        let digest = hex_digest(bytes);
-        let is_new = self.former_digests.get(relative) != Some(&digest);
-        self.digests.insert(relative.to_owned(), digest);
-        Ok(is_new)
+        self.digests.insert(relative.to_owned(), hex_digest(bytes));
+        Ok(())
     }
 
-    /// Takes the digests of files that are about to be written out of `SHA256SUMS`.
-    pub(crate) fn forget(&mut self, files: &[String]) -> Result<(), Error> {
+    /// Whether the folder already vouches for just these bytes.
+    pub(crate) fn vouches_for(&self, relative: &str, bytes: &[u8]) -> bool {
+        self.digests.get(relative) == Some(&hex_digest(bytes))
+    }
+
+    /// Removes result files that do not follow from the others any more: first from `SHA256SUMS`, so that nothing
+    /// vouches for them should this be the moment of a power cut.
+    pub(crate) fn discard(&mut self, files: &[String]) -> Result<(), Error> {
         let n_known = self.digests.len();
         self.digests.retain(|file, _| !files.contains(file));
-        if self.digests.len() < n_known { self.seal().map(|_| ()) } else { Ok(()) }
+        if self.digests.len() < n_known {
+            self.seal()?;
+        }
+        for file in files {
+            let path = self.path.join(file);
+            match fs::remove_file(&path) {
+                Err(source) if is_absent(&source) => {}
+                Err(source) => return Err(Error::Write { path, source }),
+                Ok(()) => {}
+            }
+        }
+        Ok(())
     }
 
     /// Writes a file that is not a result (a log, a time), whole or not at all.
@@ -83,16 +100,6 @@ impl RunFolder {
             AtomicWriteFile::open(&path).map_err(|source| Error::Create { path: path.clone(), source })?;
         file.write_all(bytes).map_err(write)?;
         file.commit().map_err(write)
-    }
-
-    /// Removes a result file that no longer follows from the others.
-    pub(crate) fn remove(&mut self, relative: &str) -> Result<(), Error> {
-        self.digests.remove(relative);
-        let path = self.path.join(relative);
-        match fs::remove_file(&path) {
-            Err(source) if source.kind() != io::ErrorKind::NotFound => Err(Error::Write { path, source }),
-            _ => Ok(()),
-        }
     }
 
     /// The bytes of a result file, checked against its digest if the folder has one.
@@ -120,6 +127,10 @@ impl RunFolder {
     }
 }
 
+fn is_absent(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory)
+}
+
 /// The digests of an earlier run; none if the file is missing or not ours, since then nothing can be checked.
 fn read_digests(path: &Path) -> BTreeMap<String, String> {
     let text = fs::read_to_string(path).unwrap_or_default();
@@ -132,4 +143,21 @@ fn read_digests(path: &Path) -> BTreeMap<String, String> {
 /// The SHA-256 of some bytes, in hexadecimal digits.
 pub(crate) fn hex_digest(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The number of bytes and the SHA-256 of a file, read in pieces.
+pub(crate) fn file_digest(path: &Path) -> io::Result<(u64, String)> {
+    let mut file = File::open(path)?;
+    let mut hasher = Sha256::new();
+    let mut piece = vec![0; 1 << 16];
+    let mut n_bytes = 0;
+    loop {
+        let n_read = file.read(&mut piece)?;
+        if n_read == 0 {
+            let digits = hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+            return Ok((n_bytes, digits));
+        }
+        hasher.update(&piece[..n_read]);
+        n_bytes += n_read as u64;
+    }
 }

@@ -24,6 +24,7 @@ mod folder;
 mod phantom;
 mod provenance;
 pub mod run;
+mod settings;
 pub mod stage;
 mod steps;
 
@@ -31,5 +32,7 @@ pub use config::{Config, ConfigError, Loaded, Override};
 pub use error::Error;
 pub use event::Event;
 pub use phantom::make_phantom;
+pub use provenance::input_of_run;
 pub use run::{Request, Summary, run};
+pub use settings::Difference;
 pub use stage::{Artifact, Stage};

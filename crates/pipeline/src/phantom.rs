@@ -8,7 +8,7 @@ use espalier_phantom::Kind;
 use crate::config::Config;
 use crate::error::Error;
 use crate::folder::RunFolder;
-use crate::run::{Summary, boxed};
+use crate::run::{Summary, boxed, in_pool};
 use crate::stage::Stage;
 
 /// A phantom with what its kind has: a neuron has neither scan nor mask.
@@ -55,9 +55,9 @@ impl Made {
 ///
 /// # Errors
 /// [`Error`] if the shape is not possible or a file cannot be written.
-pub fn make_phantom(config: &Config, out: &Path) -> Result<Summary, Error> {
+pub fn make_phantom(config: &Config, out: &Path, threads: Option<usize>) -> Result<Summary, Error> {
     let kind = config.input.phantom.unwrap_or(Kind::Airway);
-    let files = make(kind, config, kind != Kind::Neuron)?.files()?;
+    let files = in_pool(threads, || make(kind, config, kind != Kind::Neuron)?.files())?;
     let mut folder = RunFolder::open(out)?;
     for (name, bytes) in &files {
         folder.write(name, bytes)?;

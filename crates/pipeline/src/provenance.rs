@@ -3,38 +3,46 @@
 use std::path::Path;
 
 use espalier_model::Report;
+use espalier_model::table::Table;
 use serde::Serialize;
 
 use crate::clock;
 use crate::config::Config;
 use crate::error::Error;
-use crate::folder::{RunFolder, hex_digest};
+use crate::folder::{RunFolder, file_digest};
 use crate::stage::Stage;
 
 /// What one stage cost.
 pub(crate) struct StageCost {
     pub(crate) stage: Stage,
     pub(crate) seconds: f64,
+    pub(crate) peak_mb: Option<f64>,
 }
 
-/// Writes `provenance/config.resolved.toml`: every key of the run, and nothing of this machine.
-pub(crate) fn write_config(folder: &mut RunFolder, config: &Config) -> Result<(), Error> {
-    let mut portable = config.clone();
-    if let Some(path) = portable.input.path.as_mut().filter(|path| Path::new(path).is_absolute()) {
-        let name = Path::new(path).file_name().unwrap_or_default().to_string_lossy().into_owned();
-        *path = name;
-    }
-    folder.write("provenance/config.resolved.toml", portable.to_toml().as_bytes()).map(|_| ())
+const INPUTS_FILE: &str = "provenance/inputs.tsv";
+const RUN_FILE: &str = "provenance/run.json";
+
+/// The absolute path of the input of an earlier run in a folder, where it had one.
+#[must_use]
+pub fn input_of_run(folder: &Path) -> Option<String> {
+    let text = std::fs::read_to_string(folder.join(RUN_FILE)).ok()?;
+    let record: serde_json::Value = serde_json::from_str(&text).ok()?;
+    record.get("input")?.as_str().map(str::to_owned)
+}
+
+fn absolute(path: &Path) -> Option<String> {
+    std::path::absolute(path).ok().map(|path| path.to_string_lossy().into_owned())
 }
 
 /// Writes `provenance/inputs.tsv`: the input's content, without its name, which may be a patient's.
 pub(crate) fn write_inputs(folder: &mut RunFolder, input: Option<&Path>) -> Result<(), Error> {
-    let mut table = espalier_model::table::Table::new(&["role", "bytes", "sha256"]);
+    let mut table = Table::new(&["role", "bytes", "sha256"]);
     if let Some(path) = input {
-        let bytes = std::fs::read(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
-        table.row(&[&"input", &bytes.len(), &hex_digest(&bytes)]);
+        let (n_bytes, digest) =
+            file_digest(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
+        table.row(&[&"input", &n_bytes, &digest]);
     }
-    folder.write("provenance/inputs.tsv", table.into_string().as_bytes()).map(|_| ())
+    folder.write(INPUTS_FILE, table.into_string().as_bytes())
 }
 
 #[derive(Serialize)]
@@ -45,7 +53,9 @@ struct RunRecord<'a> {
     program_version: &'static str,
     name: &'a str,
     seed: u64,
+    /// The absolute path of the input, for stages that read it again.
     input: Option<String>,
+    stages: Vec<&'static str>,
     threads: usize,
     finished_unix_seconds: u64,
     sha256_of_sums: &'a str,
@@ -55,6 +65,7 @@ struct RunRecord<'a> {
 pub(crate) fn write_run(
     folder: &RunFolder,
     config: &Config,
+    input: Option<&Path>,
     costs: &[StageCost],
     digest: &str,
 ) -> Result<(), Error> {
@@ -65,23 +76,25 @@ pub(crate) fn write_run(
         program_version: env!("CARGO_PKG_VERSION"),
         name: &config.name,
         seed: config.seed,
-        input: config.input.path.clone(),
+        input: input.map_or_else(|| input_of_run(folder.path()), absolute),
+        stages: costs.iter().map(|cost| cost.stage.name()).collect(),
         threads: rayon::current_num_threads(),
         finished_unix_seconds: clock::unix_seconds(),
         sha256_of_sums: digest,
     };
     let json = serde_json::to_string_pretty(&record).unwrap_or_default() + "\n";
-    folder.write_aside("provenance/run.json", json.as_bytes())?;
-    let mut table = espalier_model::table::Table::new(&["stage", "seconds", "peak_mb"]);
-    let peak_mb = peak_memory_mb().map_or_else(|| "n/a".to_owned(), |mb| format!("{mb:.0}"));
+    folder.write_aside(RUN_FILE, json.as_bytes())?;
+    // The peak is of the whole program until the end of the stage: the system keeps no other.
+    let mut table = Table::new(&["stage", "seconds", "peak_mb"]);
     for cost in costs {
+        let peak_mb = cost.peak_mb.map_or_else(|| "n/a".to_owned(), |mb| format!("{mb:.0}"));
         table.row(&[&cost.stage, &format!("{:.3}", cost.seconds), &peak_mb]);
     }
     folder.write_aside("provenance/timings.tsv", table.into_string().as_bytes())
 }
 
 /// The largest memory that this process has held so far, in MB, where the system tells it.
-fn peak_memory_mb() -> Option<f64> {
+pub(crate) fn peak_memory_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     line.split_whitespace().next()?.parse::<f64>().ok().map(|kb| kb / 1024.0)

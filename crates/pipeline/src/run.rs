@@ -1,7 +1,7 @@
 //! The loop over the stages.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use espalier_model::Diagnose;
 
@@ -12,6 +12,7 @@ use crate::error::Error;
 use crate::event::Event;
 use crate::folder::RunFolder;
 use crate::provenance::{self, StageCost};
+use crate::settings::Settings;
 use crate::stage::{Artifact, Stage};
 use crate::steps::{self, Step};
 
@@ -53,19 +54,26 @@ pub struct Summary {
 /// [`Error`], which says at which stage and what to do. Files of stages that were done stay as they are; the
 /// stage that failed has written nothing.
 pub fn run(request: &Request, events: &(dyn Fn(Event) + Sync)) -> Result<Summary, Error> {
-    let threads = request.threads.unwrap_or(0);
+    in_pool(request.threads, || run_stages(request, events))
+}
+
+/// Works in a thread pool of so many threads; one per core if none are given.
+pub(crate) fn in_pool<T: Send>(
+    threads: Option<usize>,
+    work: impl FnOnce() -> Result<T, Error> + Send,
+) -> Result<T, Error> {
+    let threads = threads.unwrap_or(0);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
         .map_err(|error| Error::Threads { threads, message: error.to_string() })?;
-    pool.install(|| run_stages(request, events))
+    pool.install(work)
 }
 
 fn run_stages(request: &Request, events: &(dyn Fn(Event) + Sync)) -> Result<Summary, Error> {
-    let config = &request.loaded.config;
     let source = resolve_source(request)?;
     let stages = stages_to_do(request, &source)?;
-    let mut artifacts = artifacts_of(request, &source);
+    let artifacts = artifacts_of(request, &source);
     let input = input_file(&stages, &artifacts);
     // A missing input must not leave a folder behind.
     if let Some(path) = &input {
@@ -73,83 +81,120 @@ fn run_stages(request: &Request, events: &(dyn Fn(Event) + Sync)) -> Result<Summ
     }
 
     let mut folder = RunFolder::open(&request.out)?;
-    let mut costs = Vec::new();
-    let mut has_changed = false;
-    for &stage in &stages {
-        events(Event::Started { stage });
-        let watch = Stopwatch::start();
-        let mut step =
-            Step { stage, config, source: &source, artifacts: &mut artifacts, events, folder: &folder };
-        let outcome = match steps::perform(&mut step) {
-            Ok(outcome) => outcome,
-            Err(error) => {
-                let kept = costs.iter().map(|cost: &StageCost| cost.stage).collect();
-                folder.remove_if_unused();
-                events(Event::Stopped { kept, out: request.out.clone() });
-                return Err(error);
-            }
-        };
-        if costs.is_empty() {
-            provenance::write_config(&mut folder, config)?;
-            if request.from.is_none_or(|from| from == stages_of(&source)[0]) {
-                provenance::write_inputs(&mut folder, input.as_deref())?;
-            }
-        }
-        has_changed |= write_outcome(&mut folder, stage, &outcome)?;
-        for warning in &outcome.report.warnings {
-            events(Event::Warning { stage, code: warning.code, message: warning.message.clone() });
-        }
-        let seconds = watch.seconds();
-        events(Event::Finished { stage, seconds, line: outcome.line });
-        costs.push(StageCost { stage, seconds });
+    let mut run = Run { request, source, artifacts, events, costs: Vec::new() };
+    let done = run.perform(&mut folder, &stages, input.as_deref());
+    if done.is_err() {
+        folder.remove_if_unused();
+        let kept = run.costs.iter().map(|cost| cost.stage).collect();
+        events(Event::Stopped { kept, out: request.out.clone() });
     }
-    if has_changed {
-        remove_outdated(&mut folder, stages.last().copied())?;
-    }
-    let digest = folder.seal()?;
-    provenance::write_run(&folder, config, &costs, &digest)?;
+    let digest = done?;
     let highlights = stages.last().map(|last| last.writes()).unwrap_or_default();
     let highlights = highlights.into_iter().filter(|file| folder.path().join(file).exists()).collect();
     Ok(Summary { out: request.out.clone(), highlights, digest })
 }
 
-/// Writes a stage's files; tells whether any of them is not what the folder had.
-fn write_outcome(folder: &mut RunFolder, stage: Stage, outcome: &steps::Outcome) -> Result<bool, Error> {
-    let mut has_changed = false;
-    // Until the new files are in place nothing vouches for the old ones.
-    folder.forget(&stage.writes())?;
-    for (file, bytes) in &outcome.files {
-        has_changed |= folder.write(file, bytes)?;
-    }
-    let report = provenance::report_json(stage, &outcome.report);
-    has_changed |= folder.write(&format!("{}/report.json", stage.folder()), report.as_bytes())?;
-    // A file that this stage wrote in an earlier run, but not in this one, is not of this run.
-    let report_file = format!("{}/report.json", stage.folder());
-    for file in stage.writes() {
-        if file != report_file && !outcome.files.iter().any(|(written, _)| *written == file) {
-            folder.remove(&file)?;
-        }
-    }
-    folder.seal()?;
-    Ok(has_changed)
+/// A run under way.
+struct Run<'a> {
+    request: &'a Request,
+    source: Source,
+    artifacts: Artifacts,
+    events: &'a (dyn Fn(Event) + Sync),
+    costs: Vec<StageCost>,
 }
 
-/// Removes the files of later stages: what they were made from is no more.
-fn remove_outdated(folder: &mut RunFolder, last_done: Option<Stage>) -> Result<(), Error> {
-    for stage in Stage::ALL.into_iter().filter(|stage| Some(*stage) > last_done) {
-        for file in stage.writes() {
-            folder.remove(&file)?;
+impl Run<'_> {
+    /// Does the stages one after the other; gives the digest of the sealed folder.
+    fn perform(
+        &mut self,
+        folder: &mut RunFolder,
+        stages: &[Stage],
+        input: Option<&Path>,
+    ) -> Result<String, Error> {
+        let (config, events) = (&self.request.loaded.config, self.events);
+        let mut settings = Settings::open(folder, config);
+        self.refuse_other_settings(&settings, stages)?;
+        for &stage in stages {
+            events(Event::Started { stage });
+            let watch = Stopwatch::start();
+            let (source, artifacts) = (&self.source, &mut self.artifacts);
+            let outcome = steps::perform(&mut Step { stage, config, source, artifacts, events, folder })?;
+
+            if Some(&stage) == stages.first() {
+                self.clear_away(folder, &settings)?;
+                if Some(stage) == stages_of(&self.source).first().copied() {
+                    provenance::write_inputs(folder, input)?;
+                }
+            }
+            write_outcome(folder, stage, &outcome)?;
+            settings.adopt(folder, stage)?;
+            let digest = folder.seal()?;
+            let cost = StageCost { stage, seconds: watch.seconds(), peak_mb: provenance::peak_memory_mb() };
+            let seconds = cost.seconds;
+            self.costs.push(cost);
+            provenance::write_run(folder, config, input, &self.costs, &digest)?;
+
+            for warning in outcome.report.warnings {
+                events(Event::Warning { stage, code: warning.code, message: warning.message });
+            }
+            events(Event::Finished { stage, seconds, line: outcome.line });
         }
+        folder.seal()
+    }
+
+    /// A run that begins in the middle builds on results that were made with the same settings, or not at all.
+    /// Files that the user names are the user's to answer for.
+    fn refuse_other_settings(&self, settings: &Settings, stages: &[Stage]) -> Result<(), Error> {
+        let available = stages_of(&self.source);
+        let (Some(from), true) = (self.request.from, self.request.files.is_empty()) else { return Ok(()) };
+        let earlier: Vec<Stage> =
+            available.iter().copied().filter(|stage| Some(stage) < stages.first()).collect();
+        if earlier.is_empty() {
+            return Ok(());
+        }
+        match settings.difference(&earlier, available[0]) {
+            Some(difference) => Err(Error::OtherSettings { from, difference: Box::new(difference) }),
+            None => Ok(()),
+        }
+    }
+
+    /// Removes what is not of this run: everything, if input or seed are others; else the files of stages that a run
+    /// from this input does not have.
+    fn clear_away(&self, folder: &mut RunFolder, settings: &Settings) -> Result<(), Error> {
+        if !self.request.files.is_empty() {
+            return Ok(());
+        }
+        let available = stages_of(&self.source);
+        let is_foreign = |stage: &Stage| settings.is_other_run() || !available.contains(stage);
+        let files: Vec<String> =
+            Stage::ALL.iter().filter(|stage| is_foreign(stage)).flat_map(|s| s.writes()).collect();
+        folder.discard(&files)
+    }
+}
+
+/// Writes a stage's files. If any of them is not what the folder had, the files of later stages go first: what they
+/// were made from is no more.
+fn write_outcome(folder: &mut RunFolder, stage: Stage, outcome: &steps::Outcome) -> Result<(), Error> {
+    let report = (format!("{}/report.json", stage.folder()), provenance::report_json(stage, &outcome.report));
+    let report = (report.0, report.1.into_bytes());
+    let files: Vec<&(String, Vec<u8>)> = outcome.files.iter().chain([&report]).collect();
+    let is_same = files.iter().all(|(file, bytes)| folder.vouches_for(file, bytes));
+    let outdated: Vec<String> = Stage::ALL
+        .into_iter()
+        .filter(|other| *other == stage || (*other > stage && !is_same))
+        .flat_map(Stage::writes)
+        .filter(|file| !is_same || !files.iter().any(|(written, _)| written == file))
+        .collect();
+    folder.discard(&outdated)?;
+    for (file, bytes) in files {
+        folder.write(file, bytes)?;
     }
     Ok(())
 }
 
 fn resolve_source(request: &Request) -> Result<Source, Error> {
     let Loaded { config, base_dir } = &request.loaded;
-    config
-        .input
-        .resolve(base_dir, request.data_dir.as_deref())
-        .map_err(|error| Error::Stage { stage: Stage::Phantom, cause: Box::new(error) })
+    config.input.resolve(base_dir, request.data_dir.as_deref()).map_err(|cause| Error::Input { cause })
 }
 
 /// The stages that a run from this source passes through.

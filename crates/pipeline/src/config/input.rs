@@ -122,6 +122,13 @@ impl Input {
             "a run needs an input: set path to a file, or phantom = \"airway\" | \"vessel\" | \"neuron\"",
         )?;
         ParamError::check("path", !(has_path && self.phantom.is_some()), "set path or phantom, not both")?;
+        let is_scaled = self.scale != [1.0; 3] || self.radius_scale != 1.0;
+        let is_used = !is_scaled || self.is_traced();
+        ParamError::check(
+            "scale",
+            is_used,
+            "scale and radius_scale are for traced trees; a volume states its own",
+        )?;
         let is_scale = |scale: f64| scale.is_finite() && (1e-9..=1e9).contains(&scale);
         ParamError::check(
             "scale",
@@ -155,7 +162,9 @@ impl Input {
             return Ok(if self.is_traced() { Source::PhantomTree(kind) } else { Source::PhantomScan(kind) });
         }
         let written = self.path.as_deref().unwrap_or_default();
-        let path = match written.strip_prefix(DATA_VARIABLE) {
+        let in_data =
+            written.strip_prefix(DATA_VARIABLE).filter(|rest| rest.is_empty() || rest.starts_with('/'));
+        let path = match in_data {
             Some(rest) => {
                 let data_dir = data_dir.ok_or_else(|| ParamError {
                     key: "path",

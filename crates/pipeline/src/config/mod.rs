@@ -116,10 +116,10 @@ impl Config {
     /// # Errors
     /// [`ConfigError`] with the line, a picture of the place, and the nearest legal key or the legal range.
     pub fn parse(text: &str, path: &Path, overrides: &[Override]) -> Result<Self, Box<ConfigError>> {
-        let source = place::SourceText { text, path };
+        let source = place::SourceText { text, path, overrides };
         // The file alone comes first: only there do errors have a place.
         let alone: Self = toml::from_str(text).map_err(|error| source.parse_error(&error))?;
-        let config = if overrides.is_empty() { alone } else { source.overridden(overrides)? };
+        let config = if overrides.is_empty() { alone } else { source.overridden()? };
         config.validate(&source)?;
         Ok(config.with_defaults_of_input())
     }
@@ -131,7 +131,10 @@ impl Config {
     pub fn for_input(input: &Path, overrides: &[Override]) -> Result<Self, Box<ConfigError>> {
         let path = input.to_string_lossy();
         let file_name = input.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        let name = file_name.split('.').next().filter(|stem| !stem.is_empty()).unwrap_or("run");
+        let stem = file_name.split('.').next().unwrap_or_default();
+        let name: String =
+            stem.chars().map(|c| if is_name_character(c) { c } else { '_' }).take(100).collect();
+        let name = if name.is_empty() { "run" } else { name.as_str() };
         let text = format!(
             "schema = {SCHEMA}\nname = {}\n[input]\npath = {}\n",
             toml::Value::from(name),
@@ -184,8 +187,9 @@ impl Config {
 
 /// Whether a name can be a folder of its own anywhere, with no way out of its parent.
 fn is_folder_name(name: &str) -> bool {
-    !name.is_empty()
-        && name.len() <= 100
-        && !name.starts_with('.')
-        && name.chars().all(|c| c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | ' '))
+    !name.is_empty() && name.len() <= 100 && !name.starts_with('.') && name.chars().all(is_name_character)
+}
+
+fn is_name_character(c: char) -> bool {
+    c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | ' ')
 }

@@ -17,6 +17,8 @@ const MAX_EDIT_DISTANCE: usize = 3;
 pub(super) struct SourceText<'a> {
     pub(super) text: &'a str,
     pub(super) path: &'a Path,
+    /// What the command line lays over it.
+    pub(super) overrides: &'a [Override],
 }
 
 impl SourceText<'_> {
@@ -29,13 +31,17 @@ impl SourceText<'_> {
     pub(super) fn value_error(&self, table: &str, error: &ParamError) -> Box<ConfigError> {
         let dotted = if table.is_empty() { error.key.to_owned() } else { format!("{table}.{}", error.key) };
         let title = format!("{dotted}: {}", error.message);
+        if let Some(Override { key, value }) = self.overrides.iter().rev().find(|set| set.key == dotted) {
+            let rendered = format!("--set {key}={value}: {}", error.message);
+            return Box::new(ConfigError { rendered, hint: String::new() });
+        }
         self.at(self.find(table, error.key), &title, String::new())
     }
 
     /// The config under overrides.
-    pub(super) fn overridden(&self, overrides: &[Override]) -> Result<Config, Box<ConfigError>> {
+    pub(super) fn overridden(&self) -> Result<Config, Box<ConfigError>> {
         let mut table: Table = toml::from_str(self.text).map_err(|error| self.parse_error(&error))?;
-        for Override { key, value } in overrides {
+        for Override { key, value } in self.overrides {
             let in_set = |cause: &str, hint: String| {
                 Box::new(ConfigError { rendered: format!("--set {key}={value}: {cause}"), hint })
             };

@@ -1,0 +1,112 @@
+//! The settings that the results in a run folder were made with: `provenance/config.resolved.toml`.
+//!
+//! Each stage brings its own table along when its results are written, so the file speaks of what is there, also
+//! after a run that began in the middle, ended early, or failed.
+
+use std::path::Path;
+
+use toml::{Table, Value};
+
+use crate::config::Config;
+use crate::error::Error;
+use crate::folder::RunFolder;
+use crate::stage::Stage;
+
+const FILE: &str = "provenance/config.resolved.toml";
+
+/// What identifies a run as a whole: with another of these, no earlier result is of the same run.
+const IDENTITY: [&str; 3] = ["schema", "seed", "input"];
+
+/// The settings of a run folder, those it has and those of the run that is under way.
+pub(crate) struct Settings {
+    kept: Option<Table>,
+    wanted: Table,
+}
+
+/// A setting that earlier results were not made with.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Difference {
+    /// The dotted key.
+    pub key: String,
+    /// Its value when the results were made.
+    pub kept: String,
+    /// Its value now.
+    pub wanted: String,
+    /// The stage whose results would have to be made again.
+    pub stage: Stage,
+}
+
+impl Settings {
+    /// The settings of a folder about to see a run of `config`.
+    pub(crate) fn open(folder: &RunFolder, config: &Config) -> Self {
+        let kept =
+            folder.read(FILE).ok().and_then(|bytes| toml::from_str(&String::from_utf8(bytes).ok()?).ok());
+        Self { kept, wanted: portable(config) }
+    }
+
+    /// Whether the folder's results are of another run: another input, another seed.
+    pub(crate) fn is_other_run(&self) -> bool {
+        self.kept
+            .as_ref()
+            .is_some_and(|kept| IDENTITY.iter().any(|key| kept.get(*key) != self.wanted.get(*key)))
+    }
+
+    /// The first setting that the results of `earlier` stages were not made with; `first` is the run's first stage.
+    pub(crate) fn difference(&self, earlier: &[Stage], first: Stage) -> Option<Difference> {
+        let kept = self.kept.as_ref()?;
+        let identity = IDENTITY.iter().map(|key| (*key, first));
+        let tables = earlier.iter().map(|stage| (stage.name(), *stage));
+        identity.chain(tables).find_map(|(key, stage)| {
+            let (name, kept, wanted) = first_difference(key, kept.get(key), self.wanted.get(key))?;
+            Some(Difference { key: name, kept, wanted, stage })
+        })
+    }
+
+    /// Takes over the settings of a stage whose results have just been made, and writes the file.
+    pub(crate) fn adopt(&mut self, folder: &mut RunFolder, stage: Stage) -> Result<(), Error> {
+        let wanted = &self.wanted;
+        let kept = self.kept.get_or_insert_with(|| wanted.clone());
+        for key in IDENTITY.into_iter().chain(["name", stage.name()]) {
+            match wanted.get(key) {
+                Some(value) => _ = kept.insert(key.to_owned(), value.clone()),
+                None => _ = kept.remove(key),
+            }
+        }
+        folder.write(FILE, in_order(kept, wanted).as_bytes())
+    }
+}
+
+/// The config without what is of this machine: of the input's path only the file's name.
+fn portable(config: &Config) -> Table {
+    let mut portable = config.clone();
+    if let Some(path) = &mut portable.input.path {
+        let name = Path::new(path.as_str()).file_name().unwrap_or_default();
+        *path = name.to_string_lossy().into_owned();
+    }
+    toml::from_str(&portable.to_toml()).unwrap_or_default()
+}
+
+/// The tables as TOML, in the order of the config's own keys whatever the order in which they came.
+fn in_order(kept: &Table, order: &Table) -> String {
+    let keys = order.keys().chain(kept.keys().filter(|key| !order.contains_key(*key)));
+    let ordered: Table = keys.filter_map(|key| Some((key.clone(), kept.get(key)?.clone()))).collect();
+    toml::to_string(&ordered).unwrap_or_default()
+}
+
+/// The first key at which two values differ, with both of them as text.
+fn first_difference(
+    key: &str,
+    kept: Option<&Value>,
+    wanted: Option<&Value>,
+) -> Option<(String, String, String)> {
+    if kept == wanted {
+        return None;
+    }
+    if let (Some(Value::Table(kept)), Some(Value::Table(wanted))) = (kept, wanted) {
+        return wanted.keys().chain(kept.keys()).find_map(|inner| {
+            first_difference(&format!("{key}.{inner}"), kept.get(inner), wanted.get(inner))
+        });
+    }
+    let text = |value: Option<&Value>| value.map_or_else(|| "not set".to_owned(), ToString::to_string);
+    Some((key.to_owned(), text(kept), text(wanted)))
+}
