@@ -11,7 +11,10 @@ pub enum Error {
     /// A parameter outside its range.
     #[error("embed: {0}")]
     Param(#[from] ParamError),
-    /// The views were made for another tree.
+    /// The views were made for another tree, by its digest.
+    #[error("the views were made for another tree")]
+    OtherTree,
+    /// The views are not complete.
     #[error("the views do not fit the tree: {n_found} {what}, expected {n_expected}")]
     Views {
         /// What was counted: planes of branches or of forks.
@@ -53,44 +56,32 @@ pub enum Error {
         /// The other edge of it.
         second: usize,
     },
-    /// The result would be worse than a baseline: a bug.
-    #[error("the result of energy {energy} is worse than {method} of energy {incumbent}")]
-    Worse {
-        /// The energy of the result.
-        energy: f64,
-        /// The better method.
-        method: String,
-        /// Its energy.
-        incumbent: f64,
-    },
 }
 
 impl Diagnose for Error {
     fn code(&self) -> &'static str {
         match self {
             Self::Param(error) => error.code(),
-            Self::Views { .. } => "E-EMBED-VIEWS",
+            Self::OtherTree | Self::Views { .. } => "E-EMBED-VIEWS",
             Self::Scale { .. } => "E-EMBED-SCALE",
             Self::Memory { .. } => "E-EMBED-MEMORY",
             Self::Uncertified { .. } => "E-EMBED-UNCERTIFIED",
-            Self::Worse { .. } => "E-EMBED-WORSE",
         }
     }
 
     fn class(&self) -> Class {
         match self {
             Self::Param(error) => error.class(),
-            Self::Views { .. } | Self::Scale { .. } => Class::Input,
+            Self::OtherTree | Self::Views { .. } | Self::Scale { .. } => Class::Input,
             Self::Memory { .. } => Class::Limit,
             Self::Uncertified { .. } => Class::Uncertified,
-            Self::Worse { .. } => Class::Internal,
         }
     }
 
     fn hint(&self) -> String {
         match self {
             Self::Param(error) => error.hint(),
-            Self::Views { .. } => "run the views stage again on this very tree".to_owned(),
+            Self::OtherTree | Self::Views { .. } => "run the views stage again on this very tree".to_owned(),
             Self::Scale { .. } => "check the unit of the input".to_owned(),
             Self::Memory { .. } => {
                 "lower `particles`, choose `freedom = \"s\"` or raise `memory_mib`".to_owned()
@@ -100,7 +91,6 @@ impl Diagnose for Error {
                  the shortest edges (tree resampling)"
                     .to_owned()
             }
-            Self::Worse { .. } => "this is a bug of espalier: please report it with the input".to_owned(),
         }
     }
 }

@@ -6,7 +6,7 @@
 //! | 2 | `problem`, `ratio` | the frozen problem; equation 3 between angles and ratios |
 //! | 3 | `layout/…` | the methods: `projection`, `radial`, `cone`, `pso` (with `start`) |
 //! | 4 | `batch`, `crossing` | the swarm's energy, many particles at once, and its strict crossing count |
-//! | 5 | `pose` | one rigid motion of the whole; rounding to what is written |
+//! | 5 | `pose` | one rigid motion of the whole, mirrored or not; rounding to what is written |
 //! | 6 | `certify`, `overlap` | the exact certificate; overlaps of the drawn tubes |
 //! | 7 | `energy`, `losses`, `distances` | the one energy and all losses, for every method alike |
 //! | 8 | `select` | the best certified layout, and the table of all |
@@ -42,8 +42,9 @@ mod targets;
 
 use espalier_model::{Embedding, Report, Tree, ViewHierarchy};
 
+pub use certify::certify;
 pub use error::Error;
-pub use params::{CrossingWeight, Freedom, Method, Params, Pull, Start, TargetMode};
+pub use params::{CrossingWeight, Freedom, Method, Params, PoseMode, Pull, Start, TargetMode};
 
 /// How far the swarm is.
 #[derive(Clone, Copy, Debug, PartialEq)]

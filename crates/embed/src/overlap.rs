@@ -10,7 +10,8 @@
 //! than the organ is thick.
 //! **Steps** 1. Sweep over boxes grown by the radius. 2. Distance of centrelines. 3. Lowest common ancestor by a
 //! sparse table over the preorder. 4. Path and disc.
-//! **Guarantees** exact up to 20 million pairs whose boxes meet, a lower bound beyond. **Cost** O(N log N + boxes that meet).
+//! **Guarantees** exact up to 20 million pairs whose boxes meet, a lower bound beyond.
+//! **Cost** O(N log N + boxes that meet).
 
 use espalier_geom::math;
 use espalier_geom::plane::{Segment, segment_distance};

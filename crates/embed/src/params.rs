@@ -27,6 +27,17 @@ impl From<TargetMode> for TargetKind {
     }
 }
 
+/// How the whole is turned in the end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PoseMode {
+    /// As the global view shows the tree, as nearly as a rotation can.
+    #[default]
+    View,
+    /// The root on top, as if the tree hung from it.
+    RootOnTop,
+}
+
 /// A way to lay a tree flat.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -163,11 +174,16 @@ pub struct Params {
     /// lost before the layout begins. `projected` is the paper's.
     pub targets: TargetMode,
     /// The method whose layout is used. `pso` gives way to any other layout that ran, is free of crossings and
-    /// has a lower energy; the constructive methods give way only if they have crossings. Default `pso`.
+    /// has a lower energy (by more than rounding); the constructive methods give way only if they have crossings. Default `pso`.
     pub method: Method,
-    /// The methods that are run and compared, each one row of `compare.tsv`; `method` always runs, and so do
-    /// `radial` and `cone` where `pso` starts from them. Default all.
+    /// The methods that are run and compared, each one row of `compare.tsv`. `radial` and `cone` always run, here
+    /// or not, for they cost next to nothing and one of them is the way out where `method` crosses; so does
+    /// `method` itself. Default all.
     pub methods: Vec<Method>,
+    /// How the whole is turned in the end; no energy or loss depends on it. Default `view`, in which a scan keeps
+    /// cranial up and the patient's right on the viewer's left; `root-on-top` is for trees without such sides,
+    /// such as traced neurons.
+    pub pose: PoseMode,
     /// Weight w_l of the length ratios in the energy, ≥ 0. Default 2, the paper's. Larger keeps lengths and
     /// bends more.
     pub w_length: f64,
@@ -215,6 +231,7 @@ impl Default for Params {
             targets: TargetMode::Intrinsic,
             method: Method::Pso,
             methods: vec![Method::Projection, Method::Radial, Method::Cone, Method::Pso],
+            pose: PoseMode::View,
             w_length: 2.0,
             w_angle: 2.0,
             w_placement: 0.01,

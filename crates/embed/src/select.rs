@@ -2,9 +2,10 @@
 //!
 //! **Input** the problem, params, seed. **Output** `Embedded`.
 //! **Steps** 1. Run the methods. 2. Each layout gets its pose and is rounded. 3. Exact certificate, energy, losses.
-//! 4. The winner: for `pso` the certified layout of least energy, whoever made it; for a constructive method that
-//! method, or if it has crossings the certified layout of least energy.
-//! **Guarantees** the result is certified, and under `pso` never worse than any certified layout that ran.
+//! 4. The winner: for `pso` the certified layout of least energy, whoever made it; of equal ones, its own. For a
+//! constructive method that method, or if it has crossings the certified layout of least energy.
+//! **Guarantees** the result is certified, and under `pso` never worse than any certified layout that ran. Every
+//! layout is scored from its coordinates as written, in the handedness of the targets (see `pose`).
 //! **Cost** dominated by the swarm.
 
 use espalier_model::{
@@ -16,7 +17,7 @@ use crate::distances::SpaceDistances;
 use crate::energy::{self, Scored};
 use crate::error::Error;
 use crate::layout::{Layout, cone, projection, pso, radial};
-use crate::params::{Method, Params};
+use crate::params::{Method, Params, PoseMode};
 use crate::pose::{self, Posed};
 use crate::problem::Problem;
 use crate::{Embedded, Progress, certify, losses, overlap, place};
@@ -49,6 +50,10 @@ pub(crate) fn run_methods(
     Ok(layouts)
 }
 
+/// Energies are equal if they differ by no more than this, or than this share of the larger: 1e-12 is the energy
+/// of ratios of a millionth, which rounding can leave.
+const EQUAL: f64 = 1e-12;
+
 /// A layout as it is written, with all that is said about it.
 struct Judged {
     method: Method,
@@ -62,11 +67,17 @@ struct Judged {
     trace: Vec<TracePoint>,
 }
 
-fn judge(problem: &Problem, space: &SpaceDistances, method: Method, layout: Layout) -> Judged {
-    let posed = pose::pose(problem, &layout.positions);
-    let certificate = certify::certify(&problem.parent, &posed.positions);
-    let scored = energy::score(problem, &posed.positions, posed.quantum_mm, certificate.crossings);
-    let mut losses = losses::losses(problem, &posed.positions);
+fn judge(
+    (problem, space): (&Problem, &SpaceDistances),
+    method: Method,
+    layout: Layout,
+    mode: PoseMode,
+) -> Judged {
+    let posed = pose::pose(problem, &layout.positions, mode);
+    let certificate = certify::certify(problem.tree, &posed.positions);
+    let unreflected = posed.unreflected();
+    let scored = energy::score(problem, &unreflected, posed.quantum_mm, certificate.crossings);
+    let mut losses = losses::losses(problem, &unreflected);
     (losses.stress, losses.spearman) = space.compare(&posed.positions);
     let overlaps = overlap::count(problem, &posed.positions);
     let Layout { name, evaluations, trace, .. } = layout;
@@ -81,19 +92,16 @@ pub(crate) fn select(
     seed: u64,
 ) -> Result<Embedded, Error> {
     let space = SpaceDistances::new(problem.tree);
-    let judged: Vec<Judged> =
-        layouts.into_par_iter().map(|(method, layout)| judge(problem, &space, method, layout)).collect();
+    let mut judged: Vec<Judged> = layouts
+        .into_par_iter()
+        .map(|(method, layout)| judge((problem, &space), method, layout, params.pose))
+        .collect();
     let methods: Vec<MethodRow> = judged.iter().map(|judged| row(judged, problem.targets.kind)).collect();
     let trace = judged.iter().flat_map(|judged| judged.trace.clone()).collect();
     let winner_idx = winner(&judged, params.method)?;
-    check_never_worse(&judged, winner_idx, params.method)?;
     let report = report(problem, &judged, &judged[winner_idx], params.method);
 
-    let Some(Judged { name, posed, certificate, scored, losses, method, .. }) =
-        judged.into_iter().nth(winner_idx)
-    else {
-        return Err(Error::Uncertified { crossings: 0, first: 0, second: 0 });
-    };
+    let Judged { name, posed, certificate, scored, losses, method, .. } = judged.swap_remove(winner_idx);
     let termination = if scored.energy.length + scored.energy.angle == 0.0 {
         Termination::Optimal
     } else if params.method == Method::Pso || method == Method::Pso {
@@ -123,31 +131,22 @@ pub(crate) fn select(
 
 /// The index of the layout to use.
 fn winner(judged: &[Judged], asked: Method) -> Result<usize, Error> {
-    let as_asked = judged.iter().position(|judged| judged.method == asked && judged.certificate.holds());
-    if let (Some(idx), false) = (as_asked, asked == Method::Pso) {
-        return Ok(idx);
+    let energy = |idx: usize| judged[idx].scored.energy.total();
+    let certified = (0..judged.len()).filter(|&idx| judged[idx].certificate.holds());
+    let best = certified.clone().min_by(|&a, &b| energy(a).total_cmp(&energy(b)));
+    let as_asked = certified.clone().find(|&idx| judged[idx].method == asked);
+    let is_equal = |a: f64, b: f64| (a - b).abs() <= EQUAL * a.max(b).max(1.0);
+    if let (Some(own), Some(best)) = (as_asked, best)
+        && (asked != Method::Pso || is_equal(energy(own), energy(best)))
+    {
+        return Ok(own);
     }
-    let certified = judged.iter().enumerate().filter(|(_, judged)| judged.certificate.holds());
-    let energy = |judged: &Judged| judged.scored.energy.total();
-    let best = certified.min_by(|(_, a), (_, b)| energy(a).total_cmp(&energy(b)));
-    best.map(|(idx, _)| idx).ok_or_else(|| {
+    best.ok_or_else(|| {
         let fewest = judged.iter().min_by_key(|judged| judged.certificate.crossings);
         let certificate = fewest.map_or_else(Certificate::default, |judged| judged.certificate.clone());
         let (first, second) = certificate.pairs.first().copied().unwrap_or_default();
         Error::Uncertified { crossings: certificate.crossings, first, second }
     })
-}
-
-/// Asserts what is promised: under `pso`, no certified layout has a lower energy.
-fn check_never_worse(judged: &[Judged], winner_idx: usize, asked: Method) -> Result<(), Error> {
-    let energy = judged[winner_idx].scored.energy.total();
-    let is_better = |other: &&Judged| other.certificate.holds() && other.scored.energy.total() < energy;
-    match judged.iter().find(is_better) {
-        Some(better) if asked == Method::Pso => {
-            Err(Error::Worse { energy, method: better.name.clone(), incumbent: better.scored.energy.total() })
-        }
-        _ => Ok(()),
-    }
 }
 
 fn row(judged: &Judged, targets: TargetKind) -> MethodRow {
@@ -184,7 +183,8 @@ fn report(problem: &Problem, judged: &[Judged], winner: &Judged, asked: Method) 
     if winner.method != asked {
         let reason = match judged.iter().find(|judged| judged.method == asked) {
             Some(judged) if judged.certificate.holds() => {
-                format!("has the higher energy {:.4}", judged.scored.energy.total())
+                let (energy, least) = (judged.scored.energy.total(), winner.scored.energy.total());
+                format!("has the energy {energy:.4}, which is higher by {:.1e}", energy - least)
             }
             Some(judged) => format!("has {} crossings", judged.certificate.crossings),
             None => "did not run".to_owned(),

@@ -68,6 +68,9 @@ pub(crate) fn targets(
 }
 
 fn check_views(tree: &Tree, branches: &Branches, views: &ViewHierarchy) -> Result<(), Error> {
+    if views.tree != tree.digest() {
+        return Err(Error::OtherTree);
+    }
     let check = |what, n_found, n_expected| {
         if n_found == n_expected { Ok(()) } else { Err(Error::Views { what, n_found, n_expected }) }
     };
@@ -80,17 +83,12 @@ fn check_views(tree: &Tree, branches: &Branches, views: &ViewHierarchy) -> Resul
     check("planes of forks", n_planes, n_forks)
 }
 
-/// The picture coordinates of a vector in a view: (right, up).
-pub(crate) fn project(view: &View, vector: DVec3) -> DVec2 {
-    DVec2::new(vector.dot(view.up.cross(view.towards_camera)), vector.dot(view.up))
-}
-
 /// θ as the camera of the plane sees it; straight where the plane shows one of the two edges end-on.
 fn angle_in_plane(tree: &Tree, node: usize, parent: usize, plane: &View) -> f64 {
     let Some(grandparent) = tree.parent(parent) else { return PI };
     let hub = tree.position_mm(parent);
     let (back, ahead) = (tree.position_mm(grandparent) - hub, tree.position_mm(node) - hub);
-    let (flat_back, flat_ahead) = (project(plane, back), project(plane, ahead));
+    let (flat_back, flat_ahead) = (plane.project(back), plane.project(ahead));
     let is_seen = |flat: DVec2, solid: DVec3| flat.length() > VANISHING * solid.length();
     if is_seen(flat_back, back) && is_seen(flat_ahead, ahead) { ccw(flat_back, flat_ahead) } else { PI }
 }
@@ -107,7 +105,7 @@ fn root_angles(tree: &Tree, views: &ViewHierarchy, angle_rad: &mut [f64]) {
     let children = tree.children(0);
     let plane = views.forks[0].map_or(views.global, |fork| fork.view);
     let hub = tree.position_mm(0);
-    let seen = |child: usize| heading(project(&plane, tree.position_mm(child) - hub));
+    let seen = |child: usize| heading(plane.project(tree.position_mm(child) - hub));
     let mut headings: Vec<(f64, usize)> = children.iter().map(|&child| (seen(child), child)).collect();
     headings.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
 
@@ -129,7 +127,7 @@ fn global_headings(tree: &Tree, global: &View) -> (Vec<f64>, Vec<f64>) {
     let (mut heading_rad, mut confidence) = (vec![0.0; tree.n_nodes()], vec![0.0; tree.n_nodes()]);
     for (node, parent) in tree.edges() {
         let edge = tree.position_mm(node) - tree.position_mm(parent);
-        let flat = project(global, edge);
+        let flat = global.project(edge);
         heading_rad[node] = heading(flat);
         confidence[node] = (flat.length() / edge.length()).min(1.0);
     }

@@ -6,7 +6,8 @@ mod common;
 
 use common::{random_tree, tree_of, views_along};
 use espalier_embed::{
-    CrossingWeight, Embedded, Error, Freedom, Method, Params, Pull, Start, TargetMode, embed,
+    CrossingWeight, Embedded, Error, Freedom, Method, Params, PoseMode, Pull, Start, TargetMode, certify,
+    embed,
 };
 use espalier_model::diagnose::{Class, Diagnose};
 use espalier_model::{Embedding, MethodRow, Termination, Tree};
@@ -39,8 +40,20 @@ fn the_result_is_certified_and_never_worse() {
             assert_eq!(row.targets, embedding.targets.kind);
             let is_constructed = row.method == "radial" || row.method == "cone";
             assert!(!is_constructed || row.crossings == 0, "{} of tree {key}", row.method);
-            assert!(row.crossings > 0 || energy <= row.energy.total(), "{} of tree {key}", row.method);
+            assert!(
+                row.crossings > 0 || energy <= row.energy.total() + 1e-12,
+                "{} of tree {key}",
+                row.method
+            );
         }
+        // Nor worse than what each constructive method gives when it runs alone.
+        for method in [Method::Radial, Method::Cone] {
+            let params = Params { method, methods: Vec::new(), ..params.clone() };
+            let alone = laid_flat(&tree, &params).embedding;
+            assert_eq!(alone.method, method.name());
+            assert!(energy <= alone.energy.total() + 1e-12, "{} of tree {key} alone", alone.method);
+        }
+        assert_eq!(certify(&tree, &embedding.positions_mm), embedding.certificate);
         let constructed = embedding.methods[1].energy.total().min(embedding.methods[2].energy.total());
         n_improved += usize::from(energy < constructed);
         let energies: Vec<f64> = embedding.trace.iter().map(|point| point.energy).collect();
@@ -54,12 +67,16 @@ fn planar_trees_come_out_exactly() {
     let mut n_planar = 0;
     for key in 0..200 {
         let tree = random_tree(key as usize % 8, 4 + key as usize % 12, 1.0, true, key);
-        let embedding = laid_flat(&tree, &small()).embedding;
+        let embedded = laid_flat(&tree, &small());
+        let embedding = &embedded.embedding;
         let projection = &embedding.methods[0];
         if projection.crossings > 0 || !has_wide_angles(&tree) {
             continue;
         }
         n_planar += 1;
+        // Projection and swarm are equally good: the method asked for is used, and nothing is said.
+        assert!(embedding.method.starts_with("pso"), "tree {key}: {}", embedding.method);
+        assert!(embedded.report.warnings.is_empty(), "tree {key}: {:?}", embedded.report.warnings);
         // The plane is its own best layout: every distance is kept.
         assert!(projection.energy.total() < 1e-20, "tree {key}: {:?}", projection.energy);
         assert_eq!(embedding.termination, Termination::Optimal, "tree {key}");
@@ -233,6 +250,11 @@ fn bad_input_is_named() {
     let error = embed(&tree, &views, &small(), 0, &|_| {}).expect_err("a plane is missing");
     assert!(matches!(error, Error::Views { .. }), "{error}");
 
+    let other = random_tree(1, 30, 1.0, false, 4);
+    let error =
+        embed(&other, &views_along(&tree, DVec3::Z), &small(), 0, &|_| {}).expect_err("views of another");
+    assert_eq!((&error, error.class()), (&Error::OtherTree, Class::Input));
+
     let views = views_along(&tree, DVec3::Z);
     let error_of = |params: Params| embed(&tree, &views, &params, 0, &|_| {}).expect_err("a bad parameter");
     for (params, key) in [
@@ -267,6 +289,8 @@ fn params_read_and_write() {
     let set: Params = serde_json::from_str("{\"w_crossing\": 3, \"methods\": [\"radial\"]}").expect("legal");
     assert_eq!(set.w_crossing, CrossingWeight::Fixed(3.0));
     assert_eq!(set.methods, [Method::Radial]);
+    let set: Params = serde_json::from_str("{\"pose\": \"root-on-top\"}").expect("legal");
+    assert_eq!(set.pose, PoseMode::RootOnTop);
     let error = serde_json::from_str::<Params>("{\"w_crossing\": \"cheap\"}").expect_err("not auto");
     assert!(error.to_string().contains("expected \"auto\" or a number"), "{error}");
     assert!(serde_json::from_str::<Params>("{\"particels\": 3}").is_err());

@@ -8,10 +8,9 @@ use espalier_model::View;
 use glam::DVec2;
 
 use crate::problem::Problem;
-use crate::targets::project;
 
 /// The projected positions.
 pub(crate) fn positions(problem: &Problem, global: &View) -> Vec<DVec2> {
     let root = problem.tree.position_mm(0);
-    problem.tree.nodes().iter().map(|node| project(global, node.position_mm - root)).collect()
+    problem.tree.nodes().iter().map(|node| global.project(node.position_mm - root)).collect()
 }

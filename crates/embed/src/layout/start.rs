@@ -6,11 +6,11 @@
 //! `relaxed`: P_0 = 0, P_1 = radial, P_2 = cone. The next few *relax* the cone: they visit the segments again and
 //! again, in an order of their own, and bring each segment's angle ratios as near to zero as is free of crossings.
 //! The rest are copies of these with a few subtrees sent part of the way back to the cone.
-//! Why not the paper's start? On a tree of a few hundred segments every random particle crosses itself hundreds of
-//! times: on a vessel phantom of 1076 nodes 512 particles in 60 iterations came from 425 (the radial particle) to 265 with
-//! freedom `n`, and nowhere with `s`; relaxing alone ends at 74.7.
-//! **Guarantees** numbers depend on (seed, particle) only. **Cost** relaxing takes half as many
-//! evaluations as the iterations, at most.
+//! Why not the paper's start? On a tree of a few hundred segments every random particle crosses itself hundreds
+//! of times: on a vessel phantom of 1076 nodes 512 particles in 60 iterations came from 425 (the radial particle)
+//! to 265 with freedom `n`, and nowhere with `s`; relaxing alone ends at 74.7.
+//! **Guarantees** numbers depend on (seed, particle) only.
+//! **Cost** relaxing takes half as many evaluations as the iterations, at most.
 
 use espalier_geom::random::{Purpose, Stream};
 use rayon::prelude::*;

@@ -54,14 +54,14 @@ impl Rule<'_> {
     fn in_subtrees(&self, p: &mut [f64], u: &[f64], (own, global): (&[f64], &[f64]), stream: &mut Stream) {
         let Params { omega_g, omega_p, omega_inertia, omega_target, .. } = *self.params;
         for dim in 0..p.len() {
-            p[dim] += omega_p * (own[dim] - p[dim]);
+            self.pull(p, own, dim, omega_p);
         }
         // Take the best of all in one subtree, or everywhere else.
         let taken = self.draw_subtree(stream);
         let n_segments = self.dofs.n_lengths;
         let parts = if stream.unit() < 0.5 { [0..0, taken] } else { [0..taken.start, taken.end..n_segments] };
         for dim in parts.into_iter().flat_map(|segments| self.ratios_of(segments)).flatten() {
-            p[dim] += omega_g * (global[dim] - p[dim]);
+            self.pull(p, global, dim, omega_g);
         }
         // In another, or in a piece of a segment, go towards the targets, with a random step beside.
         let share = omega_target * 2.0 * stream.unit();
@@ -71,6 +71,12 @@ impl Rule<'_> {
             let gamma = stream.uniform(-1.0, 1.0);
             p[dim] = (p[dim] * (1.0 - share) + width * (u[dim] + gamma)).clamp(low, high);
         }
+    }
+
+    /// Draws a ratio to its best place; ω above 1 goes beyond that, but not out of the range.
+    fn pull(&self, p: &mut [f64], best: &[f64], dim: usize, omega: f64) {
+        let (low, high) = self.dofs.range(dim);
+        p[dim] = (p[dim] + omega * (best[dim] - p[dim])).clamp(low, high);
     }
 
     /// One random subtree, as a range of segments; three times out of four a single segment.
@@ -102,5 +108,41 @@ impl Rule<'_> {
         let first = self.dofs.angle[list[segments.start].nodes.start] as usize;
         let last = self.dofs.angle[list[segments.end - 1].end()] as usize;
         [segments, first..last + 1]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::{random_tree, stream, views_along};
+    use crate::params::Freedom;
+    use crate::targets;
+
+    /// The largest pulls that params allow, from particles at the ends of their ranges.
+    #[test]
+    fn ratios_stay_in_their_ranges() {
+        for (key, pull) in [Pull::Subtree, Pull::Uniform].into_iter().cycle().take(16).enumerate() {
+            let tree = random_tree(key % 8, 60, 1.0, false, key as u32);
+            let params = Params { pull, omega_g: 2.0, omega_p: 2.0, omega_inertia: 2.0, ..Params::default() };
+            let branches = tree.branches();
+            let views = views_along(&tree, glam::DVec3::Z);
+            let targets = targets::targets(&tree, &branches, &views, params.targets).expect("targets");
+            let problem = Problem::new(&tree, branches, targets, &params);
+            let dofs = DofMap::new(&problem, [Freedom::S, Freedom::B, Freedom::N][key % 3]);
+            let rule = Rule { problem: &problem, dofs: &dofs, params: &params };
+            let mut stream = stream(5000 + key as u32);
+            let mut at_an_end = || -> Vec<f64> {
+                let end = |dim| if stream.unit() < 0.5 { dofs.range(dim).0 } else { dofs.range(dim).1 };
+                (0..dofs.dims()).map(end).collect()
+            };
+            let (own, global, mut p) = (at_an_end(), at_an_end(), at_an_end());
+            let u = vec![0.5; dofs.dims()];
+            for _ in 0..50 {
+                rule.step(&mut p, &u, (&own, &global), &mut stream);
+                let strays =
+                    (0..p.len()).find(|&dim| p[dim] < dofs.range(dim).0 || p[dim] > dofs.range(dim).1);
+                assert_eq!(strays, None, "tree {key}, {pull:?}");
+            }
+        }
     }
 }
