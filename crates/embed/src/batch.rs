@@ -14,8 +14,8 @@ use espalier_geom::math;
 use glam::DVec2;
 use rayon::prelude::*;
 
+use crate::choices::Freedom;
 use crate::crossing;
-use crate::params::Freedom;
 use crate::problem::Problem;
 use crate::ratio;
 

@@ -6,9 +6,10 @@ use espalier_model::Tree;
 use glam::{DVec2, DVec3};
 
 use crate::batch::{BatchEnergy, CpuEnergy, DofMap};
+use crate::choices::{CrossingWeight, Freedom, TargetMode};
 use crate::common::{FAMILIES, random_tree, stream, tree_of, views_along};
 use crate::layout::{cone, radial};
-use crate::params::{CrossingWeight, Freedom, Params, TargetMode};
+use crate::params::Params;
 use crate::problem::Problem;
 use crate::{certify, crossing, energy, place, targets};
 

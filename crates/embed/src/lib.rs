@@ -21,6 +21,7 @@ mod batch;
 mod certify;
 #[cfg(test)]
 mod checks;
+mod choices;
 #[cfg(test)]
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -43,8 +44,9 @@ mod targets;
 use espalier_model::{Embedding, Report, Tree, ViewHierarchy};
 
 pub use certify::certify;
+pub use choices::{CrossingWeight, Freedom, Method, PoseMode, Pull, Start, TargetMode};
 pub use error::Error;
-pub use params::{CrossingWeight, Freedom, Method, Params, PoseMode, Pull, Start, TargetMode};
+pub use params::Params;
 
 /// How far the swarm is.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -23,7 +23,7 @@ use espalier_geom::math;
 use espalier_model::Pose;
 use glam::DVec2;
 
-use crate::params::PoseMode;
+use crate::choices::PoseMode;
 use crate::place;
 use crate::problem::Problem;
 

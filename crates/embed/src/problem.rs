@@ -13,7 +13,8 @@ use std::f64::consts::PI;
 use espalier_geom::math;
 use espalier_model::{Branches, Targets, Tree};
 
-use crate::params::{CrossingWeight, Params};
+use crate::choices::CrossingWeight;
+use crate::params::Params;
 use crate::ratio;
 
 /// A tree with targets and weights.

@@ -13,11 +13,12 @@ use espalier_model::{
 };
 use rayon::prelude::*;
 
+use crate::choices::{Method, PoseMode};
 use crate::distances::SpaceDistances;
 use crate::energy::{self, Scored};
 use crate::error::Error;
 use crate::layout::{Layout, cone, projection, pso, radial};
-use crate::params::{Method, Params, PoseMode};
+use crate::params::Params;
 use crate::pose::{self, Posed};
 use crate::problem::Problem;
 use crate::{Embedded, Progress, certify, losses, overlap, place};

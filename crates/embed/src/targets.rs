@@ -21,8 +21,8 @@ use espalier_geom::angle::{between, ccw, heading, wrap_positive};
 use espalier_model::{Branches, Targets, Tree, View, ViewHierarchy};
 use glam::{DVec2, DVec3};
 
+use crate::choices::TargetMode;
 use crate::error::Error;
-use crate::params::TargetMode;
 use crate::siblings;
 
 /// A projection shorter than this share of its vector has no direction.

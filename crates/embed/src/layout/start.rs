@@ -16,7 +16,8 @@ use espalier_geom::random::{Purpose, Stream};
 use rayon::prelude::*;
 
 use crate::batch::{CpuEnergy, DofMap, Scratch};
-use crate::params::{Params, Start};
+use crate::choices::Start;
+use crate::params::Params;
 use crate::problem::Problem;
 
 /// Relaxing may take the swarm's evaluations divided by this.

@@ -16,8 +16,9 @@ use std::ops::Range;
 use espalier_geom::random::Stream;
 
 use crate::batch::DofMap;
+use crate::choices::Pull;
 use crate::layout::start::segments_below;
-use crate::params::{Params, Pull};
+use crate::params::Params;
 use crate::problem::Problem;
 
 /// How a particle moves.
@@ -114,8 +115,8 @@ impl Rule<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::choices::Freedom;
     use crate::common::{random_tree, stream, views_along};
-    use crate::params::Freedom;
     use crate::targets;
 
     /// The largest pulls that params allow, from particles at the ends of their ranges.

@@ -1,0 +1,168 @@
+//! The choices among the parameters: methods, freedoms, starts, pulls, poses, and the price of a crossing.
+//!
+//! Written in the config as words in kebab-case; the price of a crossing is the word `auto` or a number.
+
+use std::fmt;
+
+use espalier_model::TargetKind;
+use serde::de::{self, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// Where target angles come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TargetMode {
+    /// The exact angle in three dimensions; the local plane only tells the side.
+    #[default]
+    Intrinsic,
+    /// The paper's: the angle as the local plane shows it.
+    Projected,
+}
+
+impl From<TargetMode> for TargetKind {
+    fn from(mode: TargetMode) -> Self {
+        match mode {
+            TargetMode::Intrinsic => Self::Intrinsic,
+            TargetMode::Projected => Self::Projected,
+        }
+    }
+}
+
+/// How the whole is turned in the end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PoseMode {
+    /// As the global view shows the tree, as nearly as a rotation can.
+    #[default]
+    View,
+    /// The root on top, as if the tree hung from it.
+    RootOnTop,
+}
+
+/// A way to lay a tree flat.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// The best global view as it is, crossings and all.
+    Projection,
+    /// Wedges of equal angle per tip around the root.
+    Radial,
+    /// Nested cones that keep the side of every turn.
+    Cone,
+    /// The paper's particle swarm.
+    #[default]
+    Pso,
+}
+
+impl Method {
+    /// The name used in the config and in tables.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Projection => "projection",
+            Self::Radial => "radial",
+            Self::Cone => "cone",
+            Self::Pso => "pso",
+        }
+    }
+}
+
+/// Which ratios a particle may choose on its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Freedom {
+    /// As printed: one length and one angle ratio per segment.
+    S,
+    /// As `s`, with an own angle ratio for the first node of each segment.
+    B,
+    /// One length ratio per segment, one angle ratio per node.
+    #[default]
+    N,
+}
+
+impl Freedom {
+    /// The name used in the config and in tables.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::S => "s",
+            Self::B => "b",
+            Self::N => "n",
+        }
+    }
+}
+
+/// Where the particles of a swarm start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Start {
+    /// Uniform over the ranges, with P_0 = 0 and P_1 = the radial layout.
+    Paper,
+    /// Near the cone, brought towards the targets segment by segment as far as that is free of crossings.
+    #[default]
+    Relaxed,
+}
+
+/// How a particle is drawn to the best places.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Pull {
+    /// Equation 5 as printed: on all ratios alike.
+    Uniform,
+    /// In a random subtree, or everywhere but there: what one subtree has found can be taken over alone.
+    #[default]
+    Subtree,
+}
+
+/// The price of a crossing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum CrossingWeight {
+    /// 1.5 times the largest energy of any layout without crossings.
+    #[default]
+    Auto,
+    /// This much.
+    Fixed(f64),
+}
+
+impl Serialize for CrossingWeight {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Auto => serializer.serialize_str("auto"),
+            Self::Fixed(weight) => serializer.serialize_f64(*weight),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for CrossingWeight {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct AutoOrNumber;
+        impl Visitor<'_> for AutoOrNumber {
+            type Value = CrossingWeight;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+                formatter.write_str("\"auto\" or a number")
+            }
+
+            fn visit_str<E: de::Error>(self, text: &str) -> Result<CrossingWeight, E> {
+                if text == "auto" {
+                    Ok(CrossingWeight::Auto)
+                } else {
+                    Err(E::invalid_value(de::Unexpected::Str(text), &self))
+                }
+            }
+
+            fn visit_f64<E: de::Error>(self, weight: f64) -> Result<CrossingWeight, E> {
+                Ok(CrossingWeight::Fixed(weight))
+            }
+
+            fn visit_i64<E: de::Error>(self, weight: i64) -> Result<CrossingWeight, E> {
+                Ok(CrossingWeight::Fixed(weight as f64))
+            }
+
+            fn visit_u64<E: de::Error>(self, weight: u64) -> Result<CrossingWeight, E> {
+                Ok(CrossingWeight::Fixed(weight as f64))
+            }
+        }
+        deserializer.deserialize_any(AutoOrNumber)
+    }
+}
