@@ -140,6 +140,15 @@ impl Cone {
         ((a - self.radii[0]).min(b - self.radii[1]), (a + self.radii[0]).max(b + self.radii[1]))
     }
 
+    /// About how many pixels the cone must look at when it is `margin` wider: its box, or its strip of the chain.
+    pub(crate) fn area(&self, margin: f32) -> f64 {
+        let (low, high) = self.bounds();
+        let bounds = (high - low + 2.0 * margin).as_dvec2();
+        let along = f64::from(self.range[1] - self.range[0]);
+        let wide = f64::from(self.radii[0].max(self.radii[1]) + margin);
+        (bounds.x * bounds.y).min(along * 2.0 * wide)
+    }
+
     /// The pixels x of a row at height `y` that the cone can reach when it is `margin` wider: low and high.
     pub(crate) fn span(&self, y: f32, margin: f32) -> Option<(f32, f32)> {
         let (low, high) = self.bounds();

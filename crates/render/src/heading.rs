@@ -29,6 +29,14 @@ pub(crate) fn planar(tree: &Tree, branches: &Branches, embedding: &Embedding, pa
     Heading { title: params.title.clone(), verdict, facts }
 }
 
+/// Says first of all that the branches do not have their widths.
+pub(crate) fn without_widths(mut said: Heading) -> Heading {
+    if let Some(first) = said.verdict.first_mut() {
+        first.push_str("; as lines, since the radii are too large to draw");
+    }
+    said
+}
+
 /// The heading of the global view.
 pub(crate) fn global(tree: &Tree, branches: &Branches, view: &View, params: &Params) -> Heading {
     let title = params.title.as_ref().map(|title| format!("{title}: in space"));

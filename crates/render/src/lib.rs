@@ -43,6 +43,7 @@ mod svg;
 mod error;
 
 use espalier_model::{Branches, Embedding, Report, Tree, ViewHierarchy};
+use glam::DVec3;
 
 use coloring::Coloring;
 pub use error::Error;
@@ -51,7 +52,7 @@ use kinship::Kinship;
 use page::{Needs, Page, Pen};
 use palette::PageColors;
 pub use params::{ColorBy, Compass, Params, Style, Theme, Unit};
-use raster::{Job, Pixel};
+use raster::{Drawn, Job, Pixel};
 use scene::Scene;
 use text::Face;
 
@@ -76,6 +77,9 @@ pub struct Rendered {
 /// `position.X Y Z` (RAS+ mm), `loss.angle` (degrees), `loss.length` (share); where `A` is 0, ids are −1 and all
 /// else is 0.
 ///
+/// Radii that cover the picture dozens of times over, as in a wrong unit, are not drawn: it shows lines then, its
+/// heading says so, and the report warns with `W-RENDER-THICK`.
+///
 /// # Errors
 /// [`Error`] if a parameter is out of range, the embedding is another tree's, a number cannot be drawn, or the
 /// picture would be over 2²⁵ pixels.
@@ -96,29 +100,55 @@ pub fn render(
         colors: PageColors::of(params.theme),
     };
 
-    let map = Scene::planar(tree, embedding, params.width_scale)?;
-    let said = heading::planar(tree, artist.branches, embedding, params);
-    let (page, groups) = artist.lay_out(&map, &said, None)?;
-    let pixels = artist.draw(&map, &page, Depth::Flat);
+    let map = artist.sheet(
+        Scene::planar(tree, embedding, params.width_scale)?,
+        heading::planar(tree, artist.branches, embedding, params),
+        Depth::Flat,
+    )?;
+    let view = &views.global;
+    let global = artist.sheet(
+        Scene::seen(tree, view, params.width_scale)?,
+        heading::global(tree, artist.branches, view, params),
+        Depth::Spatial { axes: [view.up.cross(view.towards_camera), view.up] },
+    )?;
+
+    let pixels = artist.draw(&map);
     let title = params.title.as_deref().unwrap_or("planar map of a tree");
     let content =
-        svg::Content { tree, branches: artist.branches, scene: &map, coloring: artist.coloring, title };
-    let layers = || layers::Layers::new(tree, artist.branches, embedding, (&page, &pixels)).encode();
-
+        svg::Content { tree, branches: artist.branches, scene: &map.scene, coloring: artist.coloring, title };
+    let layers = || layers::Layers::new(tree, artist.branches, embedding, (&map.page, &pixels)).encode();
     Ok(Rendered {
-        png: paint::png(&page, &pixels, &groups, (artist.colors.background, &artist.face))?,
-        svg: svg::svg(&content, &page, &groups, &artist.colors),
+        png: artist.png(&map, &pixels)?,
+        svg: svg::svg(&content, &map.page, &map.groups, &artist.colors),
         exr: params.exr.then(layers).transpose()?,
-        global_view_png: artist.global_view(views)?,
-        report: report(tree, &map, &page, &pixels),
+        global_view_png: artist.png(&global, &artist.draw(&global))?,
+        report: report(tree, [&map, &global], &pixels),
     })
 }
 
+/// How often the cones may cover a picture; round ones of the widths that organs have cover it less than once.
+const MAX_LAYERS: f64 = 48.0;
+
 /// Whether edges can pass in front of each other.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy)]
 enum Depth {
     Flat,
-    Spatial,
+    /// Seen along a direction; what points to the right and up names the letters at the edges.
+    Spatial {
+        axes: [DVec3; 2],
+    },
+}
+
+/// All that makes a picture but its pixels.
+struct Sheet {
+    scene: Scene,
+    page: Page,
+    groups: Vec<drawing::Group>,
+    kinship: Kinship,
+    drawn: Vec<Drawn>,
+    has_depth: bool,
+    /// How often the cones would have covered the picture, if that is too often.
+    too_thick: Option<f64>,
 }
 
 /// What the map and the global view have in common.
@@ -132,14 +162,29 @@ struct Artist<'a> {
 }
 
 impl Artist<'_> {
-    fn global_view(&self, views: &ViewHierarchy) -> Result<Vec<u8>, Error> {
-        let view = &views.global;
-        let scene = Scene::seen(self.tree, view, self.params.width_scale)?;
-        let said = heading::global(self.tree, self.branches, view, self.params);
-        let axes = [view.up.cross(view.towards_camera), view.up];
-        let (page, groups) = self.lay_out(&scene, &said, Some(axes))?;
-        let pixels = self.draw(&scene, &page, Depth::Spatial);
-        paint::png(&page, &pixels, &groups, (self.colors.background, &self.face))
+    /// The sheet in the style asked for; as lines of a tree without radii if those cover the picture too often.
+    fn sheet(&self, scene: Scene, said: Heading, depth: Depth) -> Result<Sheet, Error> {
+        let true_to_width = self.sheet_as(self.params.style, scene, &said, depth)?;
+        let Some(n_layers) = true_to_width.too_thick else { return Ok(true_to_width) };
+        let said = heading::without_widths(said);
+        let lines = self.sheet_as(Style::Line, true_to_width.scene.without_radii(), &said, depth)?;
+        Ok(Sheet { too_thick: Some(n_layers), ..lines })
+    }
+
+    fn sheet_as(&self, style: Style, scene: Scene, said: &Heading, depth: Depth) -> Result<Sheet, Error> {
+        let axes = if let Depth::Spatial { axes } = depth { Some(axes) } else { None };
+        let (page, groups) = self.lay_out(&scene, said, (style, axes))?;
+        let kinship = Kinship::new(self.tree, self.branches, &scene, page.px_per_mm);
+        let sketched = |style| {
+            let page = Page { pen: Pen { style, ..page.pen }, ..page };
+            sketch::edges(self.tree, &scene, &page, self.coloring, &kinship)
+        };
+        // Lines too are laid out with room for the radii, which leaves none for the lines.
+        let surface = sketched(Style::PseudoSurface);
+        let n_layers = raster::layers([page.width as usize, page.height as usize], &surface);
+        let drawn = if style == Style::PseudoSurface { surface } else { sketched(style) };
+        let too_thick = (n_layers > MAX_LAYERS).then_some(n_layers);
+        Ok(Sheet { scene, page, groups, kinship, drawn, has_depth: axes.is_some(), too_thick })
     }
 
     /// The page of a scene and all its marks; with letters at the edges if `axes` (right, up) are given.
@@ -147,7 +192,7 @@ impl Artist<'_> {
         &self,
         scene: &Scene,
         said: &Heading,
-        axes: Option<[glam::DVec3; 2]>,
+        (style, axes): (Style, Option<[DVec3; 2]>),
     ) -> Result<(Page, Vec<drawing::Group>), Error> {
         let Self { tree, coloring, params, face, colors, .. } = self;
         let (heading, heading_px) = furniture::heading(face, said, params.width_px, colors);
@@ -157,7 +202,7 @@ impl Artist<'_> {
             key_px: furniture::key_size(face, coloring, params.width_px),
             rim_px: unit_px * if axes.is_some() { 4.2 } else { 2.2 },
         };
-        let pen = Pen { min_width_px: params.min_width_px, style: params.style };
+        let pen = Pen { min_width_px: params.min_width_px, style };
         let page = Page::lay_out(tree, scene, (params.width_px, pen), &needs)?;
         let mut groups = vec![heading];
         groups.extend(furniture::key(&page, coloring, params, colors));
@@ -166,18 +211,20 @@ impl Artist<'_> {
         Ok((page, groups))
     }
 
-    fn draw(&self, scene: &Scene, page: &Page, depth: Depth) -> Vec<Pixel> {
-        let kinship = Kinship::new(self.tree, self.branches, scene, page.px_per_mm);
-        let drawn = sketch::edges(self.tree, scene, page, self.coloring, &kinship);
+    fn draw(&self, sheet: &Sheet) -> Vec<Pixel> {
         raster::rasterise(&Job {
-            size: [page.width as usize, page.height as usize],
-            drawn: &drawn,
-            kinship: &kinship,
+            size: [sheet.page.width as usize, sheet.page.height as usize],
+            drawn: &sheet.drawn,
+            kinship: &sheet.kinship,
             palette: &self.coloring.palette,
             colors: self.colors,
-            style: self.params.style,
-            has_depth: depth == Depth::Spatial,
+            style: sheet.page.pen.style,
+            has_depth: sheet.has_depth,
         })
+    }
+
+    fn png(&self, sheet: &Sheet, pixels: &[Pixel]) -> Result<Vec<u8>, Error> {
+        paint::png(&sheet.page, pixels, &sheet.groups, (self.colors.background, &self.face))
     }
 }
 
@@ -196,7 +243,8 @@ fn check_entries(tree: &Tree, embedding: &Embedding) -> Result<(), Error> {
     Ok(())
 }
 
-fn report(tree: &Tree, scene: &Scene, page: &Page, pixels: &[Pixel]) -> Report {
+fn report(tree: &Tree, [map, global]: [&Sheet; 2], pixels: &[Pixel]) -> Report {
+    let Sheet { scene, page, .. } = map;
     let mut report = Report::default();
     report.count("width_px", page.width);
     report.count("height_px", page.height);
@@ -207,5 +255,16 @@ fn report(tree: &Tree, scene: &Scene, page: &Page, pixels: &[Pixel]) -> Report {
     report.count_usize("edges_at_least_width", tree.edges().filter(is_thin).count());
     let n_covered = pixels.iter().filter(|pixel| pixel.is_covered()).count();
     report.count("covered_percent", 100.0 * n_covered as f64 / pixels.len().max(1) as f64);
+    for (sheet, name) in [(map, "map"), (global, "global view")] {
+        if let Some(n_layers) = sheet.too_thick {
+            report.warn(
+                "W-RENDER-THICK",
+                format!(
+                    "the {name} is drawn as lines: with their radii the edges would cover it about {n_layers:.0} \
+                     times over; if the radii are in another unit, set input.radius_scale or render.width_scale"
+                ),
+            );
+        }
+    }
     report
 }

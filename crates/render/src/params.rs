@@ -86,7 +86,8 @@ pub struct Params {
     /// 1600: fills a screen, and prints 13.5 cm wide at 300 dpi. Larger shows finer branches and takes longer; under
     /// 480 only the tree, the verdict and the scale bar find room.
     pub width_px: u32,
-    /// How the branches are drawn. Default the pseudo-surface.
+    /// How the branches are drawn. Default the pseudo-surface; where the radii, as in a wrong unit, would cover the
+    /// picture many times over, it gives way to lines, and heading and report say so.
     pub style: Style,
     /// Background and ink. Default light, for paper.
     pub theme: Theme,

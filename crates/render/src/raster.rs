@@ -12,7 +12,9 @@
 //! **Guarantees** the same bytes for any number of threads: a band of tiles is one task, and inside a tile cones
 //! come in preorder.
 //! **Source** section 4.1 of [Hu2022]; the blending is ours.
-//! **Cost** O(S² · drawn area + E) time, 32 bytes a pixel.
+//! **Cost** O(S² · sum of the cones' areas + E) time, 32 bytes a pixel. [`layers`] tells that sum beforehand.
+
+use std::ops::RangeInclusive;
 
 use glam::Vec2;
 use rayon::prelude::*;
@@ -29,6 +31,8 @@ pub(crate) const SAMPLES: usize = 3;
 const TILE: usize = 32;
 /// Samples per tile and axis.
 pub(crate) const TILE_SAMPLES: usize = TILE * SAMPLES;
+/// What an edge of a few pixels may take, in pixels, without being counted: however many they are, they must be drawn.
+const SLENDER_PX: f64 = 256.0;
 /// No edge.
 pub(crate) const NOTHING: u32 = u32::MAX;
 
@@ -92,6 +96,31 @@ pub(crate) struct Job<'a> {
     pub has_depth: bool,
 }
 
+/// How many times over the picture is looked at for the cones, beyond what slender cones take.
+pub(crate) fn layers(size: [usize; 2], drawn: &[Drawn]) -> f64 {
+    let looked_at: f64 = drawn
+        .iter()
+        .map(|edge| {
+            let [columns, rows] = tiles_of(size, edge);
+            // In each tile a row is looked at even where the cone does not meet it.
+            let n_rows = TILE * columns.count() * rows.count();
+            (edge.cone.area(GAP_PX) + n_rows as f64 - SLENDER_PX).max(0.0)
+        })
+        .sum();
+    looked_at / (size[0] * size[1]).max(1) as f64
+}
+
+/// The tiles that an edge touches: columns and rows.
+fn tiles_of(size: [usize; 2], edge: &Drawn) -> [RangeInclusive<usize>; 2] {
+    let (low, high) = edge.cone.bounds();
+    // Casts saturate, so what lies off the page ends on its border.
+    let range = |low: f32, high: f32, n_pixels: usize| {
+        let tile = |at: f32| ((at / TILE as f32) as usize).min(n_pixels.div_ceil(TILE) - 1);
+        tile(low - GAP_PX - 1.0)..=tile(high + GAP_PX + 1.0)
+    };
+    [range(low.x, high.x, size[0]), range(low.y, high.y, size[1])]
+}
+
 /// Draws the edges.
 pub(crate) fn rasterise(job: &Job<'_>) -> Vec<Pixel> {
     let [width, height] = job.size;
@@ -128,14 +157,9 @@ impl Tiles {
         let [n_x, n_y] = job.size.map(|pixels| pixels.div_ceil(TILE));
         let mut offsets = vec![0; n_x * n_y + 1];
         let visit = |edge: &Drawn, visitor: &mut dyn FnMut(usize)| {
-            let (low, high) = edge.cone.bounds();
-            // Casts saturate, so what lies off the page ends on its border.
-            let range = |low: f32, high: f32, n: usize| {
-                let tile = |at: f32| ((at / TILE as f32) as usize).min(n - 1);
-                tile(low - GAP_PX - 1.0)..=tile(high + GAP_PX + 1.0)
-            };
-            for tile_y in range(low.y, high.y, n_y) {
-                for tile_x in range(low.x, high.x, n_x) {
+            let [columns, rows] = tiles_of(job.size, edge);
+            for tile_y in rows {
+                for tile_x in columns.clone() {
                     visitor(tile_y * n_x + tile_x);
                 }
             }

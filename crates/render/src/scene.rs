@@ -64,6 +64,11 @@ impl Scene {
         Ok(Self { points_mm, radii_mm })
     }
 
+    /// The same centrelines without any width.
+    pub(crate) fn without_radii(self) -> Self {
+        Self { radii_mm: vec![0.0; self.radii_mm.len()], ..self }
+    }
+
     /// The corners of the box that holds every drawn disc, mm.
     pub(crate) fn bounds_mm(&self) -> (DVec2, DVec2) {
         self.points_mm.iter().zip(&self.radii_mm).fold(

@@ -1,8 +1,8 @@
 //! The map as SVG: one named, editable path per branch.
 //!
 //! **Input** the scene on its page, colours, marks. **Output** SVG 1.1 text.
-//! **Steps** 1. Each branch is one closed outline (see [`crate::outline`]). 2. A dark edge under all branches refers to the same paths, so that an edited branch
-//! takes its edge along. 3. Marks follow in named groups; text stays text.
+//! **Steps** 1. Each branch is one closed outline (see [`crate::outline`]). 2. A dark edge under all branches refers
+//! to the same paths, so that an edited branch takes its edge along. 3. Marks follow in named groups; text stays text.
 //! **Guarantees** coordinates in pixels with 2 decimals; titles and names are escaped; the picture is the same as
 //! the PNG but for the light.
 //! **Cost** O(nodes).

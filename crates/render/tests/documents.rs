@@ -172,6 +172,34 @@ fn odd_trees_have_pictures() {
 }
 
 #[test]
+fn radii_in_a_wrong_unit_give_lines_and_a_warning() {
+    let thick = |factor: f64| {
+        let tree = fern(5, 8, 1.0);
+        let nodes: Vec<_> = tree
+            .nodes()
+            .iter()
+            .map(|node| espalier_model::Node { radius_mm: factor * 0.5, ..*node })
+            .collect();
+        Tree::new(&nodes).expect("a tree")
+    };
+    for style in [Style::PseudoSurface, Style::Line] {
+        for width_px in [240, 500] {
+            let params = Params { width_px, style, ..quick() };
+            assert!(draw(&thick(1.0), &params).report.warnings.is_empty(), "true radii");
+            let rendered = draw(&thick(10_000.0), &params);
+            let codes: Vec<_> = rendered.report.warnings.iter().map(|warning| warning.code).collect();
+            assert_eq!(codes, ["W-RENDER-THICK"; 2]);
+            let heading = texts(&rendered.svg, "heading").join(" ");
+            assert!(heading.contains("as lines, since the radii are too large to draw"), "{heading}");
+            assert!(rendered.svg.contains("stroke-linecap") && !rendered.svg.contains("id=\"edges\""));
+            // The tree fills its page, as without radii.
+            let mm_per_px = |rendered: &Rendered| rendered.report.get("mm_per_px");
+            assert_eq!(mm_per_px(&rendered), mm_per_px(&draw(&thick(0.0), &params)));
+        }
+    }
+}
+
+#[test]
 fn what_cannot_be_drawn_is_refused_with_a_reason() {
     let tree = fern(5, 2, 1.0);
     let refused = |embedding: &Embedding, params: &Params| {
