@@ -158,8 +158,8 @@ fn perform(arguments: &Arguments, request: &Request) -> anyhow::Result<Summary> 
 /// A config file, or an input with every setting at its default.
 fn load(path: &Path, overrides: &[Override]) -> anyhow::Result<Loaded> {
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
+        let bytes = std::fs::read(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
+        let text = String::from_utf8(bytes).map_err(|_| anyhow!("{} is not UTF-8 text", path.display()))?;
         let config = Config::parse(&text, path, overrides).map_err(Error::from)?;
         let base_dir = path.parent().unwrap_or(Path::new("")).to_owned();
         return Ok(Loaded { config, base_dir });

@@ -23,7 +23,8 @@ fn main() -> ExitCode {
         }
     };
     match commands::execute(&arguments) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) if progress::results_arrived() => ExitCode::SUCCESS,
+        Ok(()) => ExitCode::from(Class::Io.exit_code()),
         Err(error) => commands::report_failure(&error),
     }
 }

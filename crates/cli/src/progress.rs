@@ -1,8 +1,9 @@
 //! Progress on standard error: a bar on a terminal, one line a stage everywhere.
 
-use std::io::{IsTerminal, Write};
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::path::Path;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use espalier_pipeline::{Event, Stage};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -12,9 +13,23 @@ pub(crate) fn line(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
 
-/// Prints a line to standard output. A closed standard output (`| head`) is no reason to stop.
+/// Whether a line of results was lost.
+static IS_RESULT_LOST: AtomicBool = AtomicBool::new(false);
+
+/// Prints a line to standard output. A reader that has had enough (`| head`) is no reason to stop.
 pub(crate) fn result(text: &str) {
-    let _ = writeln!(std::io::stdout(), "{text}");
+    match writeln!(std::io::stdout(), "{text}") {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            line(&format!("error: cannot print results: {error}"));
+            IS_RESULT_LOST.store(true, Ordering::Relaxed);
+        }
+        _ => {}
+    }
+}
+
+/// Whether every line of results could be printed, as far as anyone wanted to read.
+pub(crate) fn results_arrived() -> bool {
+    !IS_RESULT_LOST.load(Ordering::Relaxed)
 }
 
 /// Shows the events of a run.

@@ -32,8 +32,10 @@ impl From<TargetMode> for TargetKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PoseMode {
-    /// As the global view shows the tree, as nearly as a rotation can.
+    /// As in the view, unless the caller knows that the tree was not made from a scan: then the root on top.
     #[default]
+    Auto,
+    /// As the global view shows the tree, as nearly as a rotation can.
     View,
     /// The root on top, as if the tree hung from it.
     RootOnTop,

@@ -19,9 +19,9 @@ pub struct Params {
     /// or not, for they cost next to nothing and one of them is the way out where `method` crosses; so does
     /// `method` itself. Default all.
     pub methods: Vec<Method>,
-    /// How the whole is turned in the end; no energy or loss depends on it. Default `view`, in which a scan keeps
-    /// cranial up and the patient's right on the viewer's left; `root-on-top` is for trees without such sides,
-    /// such as traced neurons.
+    /// How the whole is turned in the end; no energy or loss depends on it. Default `auto`: `view` for a
+    /// scan, which keeps cranial up and the patient's right on the viewer's left; `root-on-top` for a traced tree,
+    /// which has no such sides.
     pub pose: PoseMode,
     /// Weight w_l of the length ratios in the energy, ≥ 0. Default 2, the paper's. Larger keeps lengths and
     /// bends more.
@@ -70,7 +70,7 @@ impl Default for Params {
             targets: TargetMode::Intrinsic,
             method: Method::Pso,
             methods: vec![Method::Projection, Method::Radial, Method::Cone, Method::Pso],
-            pose: PoseMode::View,
+            pose: PoseMode::Auto,
             w_length: 2.0,
             w_angle: 2.0,
             w_placement: 0.01,

@@ -61,7 +61,7 @@ pub(crate) fn pose(problem: &Problem, positions: &[DVec2], mode: PoseMode) -> Po
 
     let as_seen_rad = heading(if is_reflected { mirrored } else { agreement });
     let rotation_rad = match mode {
-        PoseMode::View => as_seen_rad,
+        PoseMode::Auto | PoseMode::View => as_seen_rad,
         PoseMode::RootOnTop => hanging_rad(problem, &posed).unwrap_or(as_seen_rad),
     };
     let turn = math::unit_vector(rotation_rad);

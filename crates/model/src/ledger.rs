@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use crate::FileError;
+
 /// What was done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
@@ -23,6 +25,16 @@ pub enum LedgerKind {
 }
 
 impl LedgerKind {
+    const ALL: [Self; 7] = [
+        Self::ComponentDropped,
+        Self::LoopCut,
+        Self::SpurPruned,
+        Self::TipExtended,
+        Self::NodesMerged,
+        Self::RootResolved,
+        Self::RadiusRepaired,
+    ];
+
     /// The name used in `topology.tsv`.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -64,6 +76,20 @@ impl Ledger {
         self.0.iter().filter(|entry| entry.kind == kind).count()
     }
 
+    /// The ledger of a table that [`Ledger::to_tsv`] made; lengths are rounded as there.
+    ///
+    /// # Errors
+    /// [`FileError::Invalid`] with the line, if a column is missing, a number is none, or a kind is unknown.
+    pub fn from_tsv(text: &str) -> Result<Self, FileError> {
+        let entry = |(line_idx, line): (usize, &str)| {
+            parse_entry(line).ok_or_else(|| FileError::Invalid {
+                format: "topology.tsv",
+                what: format!("line {} is no entry of a ledger: {line}", line_idx + 1),
+            })
+        };
+        text.lines().enumerate().skip(1).map(entry).collect::<Result<_, _>>().map(Self)
+    }
+
     /// The table `topology.tsv`.
     #[must_use]
     pub fn to_tsv(&self) -> String {
@@ -91,5 +117,39 @@ impl Ledger {
             ]);
         }
         table.into_string()
+    }
+}
+
+fn parse_entry(line: &str) -> Option<LedgerEntry> {
+    let [_, kind, x, y, z, radius, length, reason] = line.split('\t').collect::<Vec<_>>().try_into().ok()?;
+    let number = |text: &str| if text == "n/a" { Some(f64::NAN) } else { text.parse().ok() };
+    Some(LedgerEntry {
+        kind: LedgerKind::ALL.into_iter().find(|known| known.name() == kind)?,
+        position_mm: DVec3::new(number(x)?, number(y)?, number(z)?),
+        radius_mm: number(radius)?,
+        length_mm: number(length)?,
+        reason: reason.to_owned(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_comes_back_as_it_was() {
+        let entry = |kind, length_mm| LedgerEntry {
+            kind,
+            position_mm: DVec3::new(1.25, -0.5, 1e3),
+            radius_mm: 0.75,
+            length_mm,
+            reason: format!("because of {length_mm} mm"),
+        };
+        let kinds = LedgerKind::ALL.into_iter().zip(0..);
+        let ledger = Ledger(kinds.map(|(kind, length)| entry(kind, f64::from(length))).collect());
+        let read = Ledger::from_tsv(&ledger.to_tsv()).expect("its own table");
+        assert_eq!(read, ledger);
+        assert!(Ledger::from_tsv("header\n0\tloop_cut\t1\t2\n").is_err());
+        assert!(Ledger::from_tsv("header\n0\tloop_shut\t1\t2\t3\t4\t5\tx\n").is_err());
     }
 }

@@ -8,13 +8,16 @@ use std::sync::Arc;
 
 use espalier_model::swc::{self, Traced};
 use espalier_model::{
-    Diagnose, Embedding, InscribedSpheres, Mask, Report, Skeleton, Tree, ViewHierarchy, Volume,
+    Diagnose, Embedding, InscribedSpheres, Ledger, Mask, Report, Skeleton, Tree, ViewHierarchy, Volume,
 };
 
-use crate::config::Input;
+use crate::config::{Input, Unit};
 use crate::error::Error;
 use crate::folder::RunFolder;
 use crate::stage::{Artifact, Stage};
+
+/// Where the `volume` stage leaves its part of the topology ledger.
+const DROPPED_FILE: &str = "stages/01-volume/dropped.tsv";
 
 /// The hand-over data of a run.
 #[derive(Default)]
@@ -24,9 +27,13 @@ pub(crate) struct Artifacts {
     pub(crate) read_options: espalier_volume::ReadOptions,
     /// How a traced tree is scaled.
     pub(crate) input: Input,
+    /// Whether neither the user nor the traced tree's file has said what its unit is.
+    pub(crate) is_unit_guessed: bool,
     pub(crate) volume: Option<Arc<Volume>>,
     pub(crate) traced: Option<Arc<Traced>>,
     pub(crate) mask: Option<Arc<Mask>>,
+    /// What the mask has lost on the way from the scan.
+    pub(crate) dropped: Option<Ledger>,
     pub(crate) skeleton: Option<Arc<Skeleton>>,
     pub(crate) spheres: Option<Arc<InscribedSpheres>>,
     pub(crate) tree: Option<Arc<Tree>>,
@@ -62,6 +69,8 @@ impl Artifacts {
         let path = self.locate(Artifact::Traced, lookup)?;
         let bytes = self.read_bounded(&path)?;
         let scale = self.input.traced_scale(swc::is_own(&bytes));
+        self.is_unit_guessed =
+            self.input.unit == Unit::Auto && self.input.scale == [1.0; 3] && !swc::is_own(&bytes);
         let (traced, report) = swc::parse(&bytes, &scale).map_err(|error| Error::file(&path, error))?;
         let traced = Arc::new(traced);
         self.traced = Some(Arc::clone(&traced));
@@ -77,6 +86,19 @@ impl Artifacts {
         let mask = Arc::new(Mask::new(volume.grid().clone(), volume.map_values(|value| value != 0.0)));
         self.mask = Some(Arc::clone(&mask));
         Ok(mask)
+    }
+
+    /// The ledger of the mask; empty for a mask that was not made here.
+    pub(crate) fn dropped(&mut self, lookup: Lookup<'_>) -> Result<Ledger, Error> {
+        if let Some(dropped) = &self.dropped {
+            return Ok(dropped.clone());
+        }
+        let path = lookup.folder.path().join(DROPPED_FILE);
+        if !path.exists() {
+            return Ok(Ledger::default());
+        }
+        let text = String::from_utf8_lossy(&lookup.folder.read(DROPPED_FILE)?).into_owned();
+        Ledger::from_tsv(&text).map_err(|error| Error::file(&path, error))
     }
 
     pub(crate) fn skeleton(&mut self, lookup: Lookup<'_>) -> Result<Arc<Skeleton>, Error> {
@@ -126,8 +148,18 @@ impl Artifacts {
     pub(crate) fn embedding(&mut self, lookup: Lookup<'_>) -> Result<Arc<Embedding>, Error> {
         let tree = self.tree(lookup)?;
         let embedding = self.embedding.clone();
+        let known = embedding.is_some();
         let embedding =
             self.parsed(embedding, Artifact::Embedding, lookup, |text| Embedding::from_json(text, &tree))?;
+        if !known {
+            // What a file says of itself is checked before a picture repeats it.
+            let (stated, found) =
+                (&embedding.certificate, espalier_embed::certify(&tree, &embedding.positions_mm));
+            if *stated != found {
+                let path = self.locate(Artifact::Embedding, lookup)?;
+                return Err(Error::Certificate { path, stated: stated.crossings, found: found.crossings });
+            }
+        }
         self.embedding = Some(Arc::clone(&embedding));
         Ok(embedding)
     }

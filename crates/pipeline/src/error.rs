@@ -49,6 +49,16 @@ pub enum Error {
         /// The file.
         path: PathBuf,
     },
+    /// An embedding whose certificate does not hold.
+    #[error("{path} states {stated} crossings, its coordinates have {found}", path = path.display())]
+    Certificate {
+        /// The file.
+        path: PathBuf,
+        /// The crossings that the file states.
+        stated: usize,
+        /// The crossings of its coordinates.
+        found: usize,
+    },
     /// A stage that this input does not pass through was asked for.
     #[error("--{flag} {stage}: a run from this input has no such stage; it has {available}")]
     NoSuchStage {
@@ -151,6 +161,7 @@ impl Diagnose for Error {
             Self::Stage { cause, .. } | Self::File { cause, .. } => cause.code(),
             Self::MissingArtifact { .. } => "E-RUN-MISSING-FILE",
             Self::Altered { .. } => "E-RUN-ALTERED-FILE",
+            Self::Certificate { .. } => "E-RUN-CERTIFICATE",
             Self::NoSuchStage { .. } | Self::EmptyRange { .. } => "E-RUN-STAGES",
             Self::Input { .. } => "E-INPUT",
             Self::OtherSettings { .. } => "E-RUN-SETTINGS",
@@ -173,7 +184,7 @@ impl Diagnose for Error {
             | Self::OtherSettings { .. }
             | Self::Threads { .. } => Class::Usage,
             Self::MissingArtifact { .. } | Self::Read { .. } | Self::Write { .. } => Class::Io,
-            Self::Altered { .. } => Class::Uncertified,
+            Self::Altered { .. } | Self::Certificate { .. } => Class::Uncertified,
             Self::TooLarge { .. } => Class::Limit,
             Self::Create { .. } => Class::CannotCreate,
             Self::Locked { .. } => Class::Locked,
@@ -184,6 +195,7 @@ impl Diagnose for Error {
         match self {
             Self::Config(error) => error.hint(),
             Self::Stage { cause, .. } | Self::File { cause, .. } => cause.hint(),
+            Self::Certificate { .. } => "make the embedding again with espalier embed".to_owned(),
             Self::MissingArtifact { .. } => "start from an earlier stage with --from, or name the file".to_owned(),
             Self::Altered { .. } => {
                 "run the stage that makes it again; or, if the edit is meant, give the file to the stage's own \

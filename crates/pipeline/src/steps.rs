@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use espalier_model::table::{Table, fixed};
 use espalier_model::{
-    Embedding, Grid, GridError, InscribedSpheres, Ledger, Mask, MethodRow, Report, ViewHierarchy, nifti_out,
-    swc,
+    Embedding, Grid, GridError, InscribedSpheres, Ledger, Mask, MethodRow, Report, Tree, ViewHierarchy,
+    nifti_out, swc,
 };
 
 use crate::artifacts::{Artifacts, Lookup};
@@ -78,15 +78,21 @@ fn volume(step: &mut Step<'_>) -> Result<Outcome, Error> {
         espalier_volume::segment(&scan, &step.config.volume).map_err(|error| step.failed(error))?;
     let mask = on_stored_grid(segmented.mask).map_err(|error| step.failed(error))?;
     let n_foreground = mask.n_foreground();
-    let line = format!(
+    let mut line = format!(
         "{n_foreground} voxels, {:.1} ml of {}",
         n_foreground as f64 * mask.grid().voxel_volume_mm3() / 1000.0,
         describe_grid(mask.grid())
     );
+    let dropped = segmented.ledger.to_tsv();
+    step.artifacts.dropped = Some(step.read_back(&dropped, Ledger::from_tsv)?);
+    let n_dropped = segmented.report.get("components_dropped").unwrap_or(0.0);
+    if n_dropped > 0.0 {
+        line = format!("{line}; {n_dropped} components dropped");
+    }
     report.extend(segmented.report);
     let files = vec![
         step.place(Artifact::Mask, nifti_out::mask(&mask).map_err(|error| step.failed(error))?),
-        step.beside("dropped.tsv", segmented.ledger.to_tsv().into_bytes()),
+        step.beside("dropped.tsv", dropped.into_bytes()),
     ];
     // The scan is not needed any more, and it is the largest thing of the run.
     step.artifacts.volume = None;
@@ -127,6 +133,7 @@ fn radius(step: &mut Step<'_>) -> Result<Outcome, Error> {
 
 fn tree(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let params = &step.config.tree;
+    let mut ledger = Ledger::default();
     let (built, mut report) = if step.is_traced() {
         let (traced, report) = step.take(Artifacts::traced)?;
         (espalier_tree::from_traced(&traced, params).map_err(|error| step.failed(error))?, report)
@@ -134,12 +141,16 @@ fn tree(step: &mut Step<'_>) -> Result<Outcome, Error> {
         let mask = step.take(Artifacts::mask)?;
         let skeleton = step.take(Artifacts::skeleton)?;
         let spheres = step.take(Artifacts::spheres)?;
+        ledger = step.take(Artifacts::dropped)?;
         let built =
             espalier_tree::build(&mask, &skeleton, &spheres, params).map_err(|error| step.failed(error))?;
         (built, Report::default())
     };
     report.extend(built.report);
-    let text = swc::write(&built.tree, &[("name", &step.config.name)]);
+    if step.artifacts.is_unit_guessed {
+        warn_of_unit(&built.tree, &mut report);
+    }
+    let text = swc::write(&built.tree, &[]);
     let tree = step.read_back(&text, swc::read_tree)?;
     let line = format!(
         "{} nodes, {} branches, {} tips, {}{}",
@@ -149,12 +160,26 @@ fn tree(step: &mut Step<'_>) -> Result<Outcome, Error> {
         readable_length(tree.length_mm()),
         ledger_phrase(&built.ledger)
     );
+    ledger.0.extend(built.ledger.0);
     step.artifacts.tree = Some(Arc::new(tree));
     let files = vec![
         step.place(Artifact::Tree, text.into_bytes()),
-        ("topology.tsv".to_owned(), built.ledger.to_tsv().into_bytes()),
+        ("topology.tsv".to_owned(), ledger.to_tsv().into_bytes()),
     ];
     Ok(Outcome { files, report, line })
+}
+
+/// Warns of a traced tree too large for a neuron where nobody has said what its unit is.
+fn warn_of_unit(tree: &Tree, report: &mut Report) {
+    /// Few neurons spread over more than some centimetres.
+    const LARGEST_EXTENT_MM: f64 = 100.0;
+    let extent_mm = 2.0 * tree.extent_mm();
+    if extent_mm > LARGEST_EXTENT_MM {
+        report.warn(
+            "W-SWC-UNIT",
+            format!("taken as µm, the tree is {extent_mm:.0} mm across: set input.unit or input.scale if that is wrong"),
+        );
+    }
 }
 
 fn views(step: &mut Step<'_>) -> Result<Outcome, Error> {

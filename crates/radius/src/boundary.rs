@@ -68,8 +68,9 @@ impl Boundary {
         self.sites.iter().map(|site| site.distance_squared(point)).fold(f64::INFINITY, f64::min).sqrt()
     }
 
-    /// The point near `start`, across the branch, whose distance is largest, and that distance.
-    pub(crate) fn highest_near(&self, start: DVec3, tangent: Option<DVec3>) -> (DVec3, f64) {
+    /// The point near `start`, across the branch and in the box from the first to the last voxel at `last_mm`, whose
+    /// distance is largest, and that distance.
+    pub(crate) fn highest_near(&self, start: DVec3, tangent: Option<DVec3>, last_mm: DVec3) -> (DVec3, f64) {
         let directions: Vec<DVec3> = match tangent {
             Some(tangent) => {
                 let (right, up) = plane_axes(tangent, DVec3::Z);
@@ -87,7 +88,8 @@ impl Boundary {
                     // The spacing that this direction sees.
                     let length = step * (*direction * self.spacing).length();
                     let point = best.0 + *direction * length;
-                    if point.distance(start) > reach {
+                    let is_inside = point == point.clamp(DVec3::ZERO, last_mm);
+                    if !is_inside || point.distance(start) > reach {
                         continue;
                     }
                     let distance = self.distance_mm(point);

@@ -82,14 +82,17 @@ fn measure(
 ) -> Sphere {
     let grid = mask.grid();
     let spacing = grid.spacing_mm();
+    let last_mm = DVec3::from_array(grid.shape().map(|n| (n - 1) as f64)) * spacing;
     let voxel = voxel.map(i64::from);
     let (center, distance_mm) = match params.rule {
         Rule::Voxel => (field.position_mm(voxel), field.distance_mm(voxel)),
         Rule::NeighborhoodMax => {
             (center::on_ridge(field, voxel, tangent, params.climb_steps), field.neighborhood_max_mm(voxel))
         }
-        Rule::Ridge => on_ridge_between_voxels(field, voxel, tangent, params.climb_steps),
+        Rule::Ridge => on_ridge_between_voxels(field, voxel, tangent, params.climb_steps, last_mm),
     };
+    // Where the border cuts the organ lengthwise, its ridge may lie outside of what was scanned.
+    let center = center.clamp(DVec3::ZERO, last_mm);
     let border_mm = distance_to_border(grid, center);
     // Without any background the border of the scan is all there is to measure.
     let known = |distance_mm: f64| if distance_mm.is_finite() { distance_mm } else { border_mm };
@@ -105,19 +108,20 @@ fn measure(
     }
 }
 
-/// Centre and radius by [`Rule::Ridge`].
+/// Centre and radius by [`Rule::Ridge`], within the box from the first to the last voxel at `last_mm`.
 fn on_ridge_between_voxels(
     field: &DistanceField,
     voxel: [i64; 3],
     tangent: Option<DVec3>,
     climb_steps: u32,
+    last_mm: DVec3,
 ) -> (DVec3, f64) {
-    let start = center::on_ridge(field, voxel, tangent, climb_steps);
-    let (mut center, mut distance_mm) = Boundary::around(field, start).highest_near(start, tangent);
+    let start = center::on_ridge(field, voxel, tangent, climb_steps).clamp(DVec3::ZERO, last_mm);
+    let (mut center, mut distance_mm) = Boundary::around(field, start).highest_near(start, tangent, last_mm);
     if distance_mm < field.distance_mm(voxel) {
         // In branches of one or two voxels the weighted centroid can lie nearer to the wall than the voxel.
         let start = field.position_mm(voxel);
-        (center, distance_mm) = Boundary::around(field, start).highest_near(start, tangent);
+        (center, distance_mm) = Boundary::around(field, start).highest_near(start, tangent, last_mm);
     }
     match tangent {
         Some(tangent) if distance_mm.is_finite() => {

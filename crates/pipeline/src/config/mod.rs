@@ -9,6 +9,7 @@ mod place;
 
 use std::path::{Path, PathBuf};
 
+use espalier_embed::PoseMode;
 use espalier_model::diagnose::{Class, Diagnose, ParamError};
 use espalier_render::Compass;
 use serde::{Deserialize, Serialize};
@@ -152,9 +153,17 @@ impl Config {
 
     /// The config with the defaults that hang on the kind of input filled in, so that the resolved copy has them.
     fn with_defaults_of_input(mut self) -> Self {
+        // Only a scan says where right and left of the patient are, and what is up.
+        let (compass, pose) = if self.input.is_traced() {
+            (Compass::Axes, PoseMode::RootOnTop)
+        } else {
+            (Compass::Anatomical, PoseMode::View)
+        };
         if self.render.compass == Compass::Auto {
-            // Only a scan says where right and left of the patient are.
-            self.render.compass = if self.input.is_traced() { Compass::Axes } else { Compass::Anatomical };
+            self.render.compass = compass;
+        }
+        if self.embed.pose == PoseMode::Auto {
+            self.embed.pose = pose;
         }
         self
     }
