@@ -186,9 +186,16 @@ fn stages_on_their_own_equal_a_run() {
     with_swarm(&["views", "pieces/tree.swc", "-o", "pieces"]);
     with_swarm(&["embed", "pieces/tree.swc", "pieces/views.json", "-o", "pieces"]);
     with_swarm(&["render", "pieces/tree.swc", "pieces/views.json", "pieces/embedding.json", "-o", "pieces"]);
-    for file in
-        ["tree.swc", "topology.tsv", "views.json", "embedding.json", "nodes.tsv", "planar.png", "planar.svg"]
-    {
+    for file in [
+        "tree.swc",
+        "topology.tsv",
+        "views.json",
+        "embedding.json",
+        "nodes.tsv",
+        "planar.png",
+        "planar.svg",
+        "global-view.png",
+    ] {
         let [whole, pieces] =
             ["whole", "pieces"].map(|run| fs::read(folder.path().join(run).join(file)).expect("file"));
         assert!(whole == pieces, "{file} differs");

@@ -16,7 +16,7 @@ use glam::DVec3;
 
 pub use error::SwcError;
 pub use parse::parse;
-pub use write::{is_own, read_tree, write};
+pub use write::{header_value, is_own, read_tree, write};
 
 /// One line of an SWC file, scaled to mm.
 #[derive(Clone, Copy, Debug, PartialEq)]

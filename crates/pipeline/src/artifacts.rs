@@ -16,6 +16,11 @@ use crate::error::Error;
 use crate::folder::RunFolder;
 use crate::stage::{Artifact, Stage};
 
+/// The header key of `tree.swc` that says what the tree was made from, and what it says.
+pub(crate) const SOURCE_KEY: &str = "source";
+pub(crate) const SOURCE_SCAN: &str = "scan";
+pub(crate) const SOURCE_TRACING: &str = "tracing";
+
 /// Where the `volume` stage leaves its part of the topology ledger.
 const DROPPED_FILE: &str = "stages/01-volume/dropped.tsv";
 
@@ -37,6 +42,8 @@ pub(crate) struct Artifacts {
     pub(crate) skeleton: Option<Arc<Skeleton>>,
     pub(crate) spheres: Option<Arc<InscribedSpheres>>,
     pub(crate) tree: Option<Arc<Tree>>,
+    /// Whether the tree was made from a scan, so that its space is a body's.
+    pub(crate) is_of_scan: bool,
     pub(crate) views: Option<Arc<ViewHierarchy>>,
     pub(crate) embedding: Option<Arc<Embedding>>,
 }
@@ -130,8 +137,12 @@ impl Artifacts {
     }
 
     pub(crate) fn tree(&mut self, lookup: Lookup<'_>) -> Result<Arc<Tree>, Error> {
-        let tree = self.tree.clone();
-        let tree = self.parsed(tree, Artifact::Tree, lookup, swc::read_tree)?;
+        let (tree, mut is_of_scan) = (self.tree.clone(), self.is_of_scan);
+        let tree = self.parsed(tree, Artifact::Tree, lookup, |text| {
+            is_of_scan = swc::header_value(text, SOURCE_KEY) == Some(SOURCE_SCAN);
+            swc::read_tree(text)
+        })?;
+        self.is_of_scan = is_of_scan;
         self.tree = Some(Arc::clone(&tree));
         Ok(tree)
     }

@@ -4,13 +4,15 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
+use espalier_embed::PoseMode;
 use espalier_model::table::{Table, fixed};
 use espalier_model::{
     Embedding, Grid, GridError, InscribedSpheres, Ledger, Mask, MethodRow, Report, Tree, ViewHierarchy,
     nifti_out, swc,
 };
+use espalier_render::Compass;
 
-use crate::artifacts::{Artifacts, Lookup};
+use crate::artifacts::{Artifacts, Lookup, SOURCE_KEY, SOURCE_SCAN, SOURCE_TRACING};
 use crate::config::{Config, Source};
 use crate::error::Error;
 use crate::event::Event;
@@ -150,7 +152,10 @@ fn tree(step: &mut Step<'_>) -> Result<Outcome, Error> {
     if step.artifacts.is_unit_guessed {
         warn_of_unit(&built.tree, &mut report);
     }
-    let text = swc::write(&built.tree, &[]);
+    let is_of_scan = !step.is_traced();
+    let source = if is_of_scan { SOURCE_SCAN } else { SOURCE_TRACING };
+    let text = swc::write(&built.tree, &[(SOURCE_KEY, source)]);
+    step.artifacts.is_of_scan = is_of_scan;
     let tree = step.read_back(&text, swc::read_tree)?;
     let line = format!(
         "{} nodes, {} branches, {} tips, {}{}",
@@ -207,7 +212,11 @@ fn embed(step: &mut Step<'_>) -> Result<Outcome, Error> {
         let note = format!("energy {:.4}, crossings {}", p.energy, p.crossings);
         events(Event::Progress { stage, done: p.done, total: p.total, note });
     };
-    let embedded = espalier_embed::embed(&tree, &views, &step.config.embed, step.config.seed, &progress)
+    let mut params = step.config.embed.clone();
+    if params.pose == PoseMode::Auto {
+        params.pose = if step.artifacts.is_of_scan { PoseMode::View } else { PoseMode::RootOnTop };
+    }
+    let embedded = espalier_embed::embed(&tree, &views, &params, step.config.seed, &progress)
         .map_err(|error| step.failed(error))?;
     let json = embedded.embedding.to_json();
     let embedding = step.read_back(&json, |text| Embedding::from_json(text, &tree))?;
@@ -228,6 +237,10 @@ fn render(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let embedding = step.take(Artifacts::embedding)?;
     let mut params = step.config.render.clone();
     params.title.get_or_insert_with(|| step.config.name.clone());
+    if params.compass == Compass::Auto {
+        // Only a scan says where right and left of the patient are.
+        params.compass = if step.artifacts.is_of_scan { Compass::Anatomical } else { Compass::Axes };
+    }
     let made =
         espalier_render::render(&tree, &embedding, &views, &params).map_err(|error| step.failed(error))?;
     let mut files = vec![

@@ -79,12 +79,17 @@ pub fn is_own(text: &[u8]) -> bool {
     text.starts_with(format!("# format {FORMAT} ").as_bytes())
 }
 
+/// The value of the first header line `# key value`.
+#[must_use]
+pub fn header_value<'t>(text: &'t str, key: &str) -> Option<&'t str> {
+    let value_of = |line: &'t str| line.strip_prefix("# ")?.strip_prefix(key)?.strip_prefix(' ');
+    text.lines().take_while(|line| line.starts_with('#')).find_map(value_of).map(str::trim_end)
+}
+
 /// The first header line with `key` must say `expected`.
 fn expect_header(text: &str, key: &'static str, expected: &'static str) -> Result<(), SwcError> {
-    let value_of =
-        |line: &str| Some(line.strip_prefix("# ")?.strip_prefix(key)?.strip_prefix(' ')?.to_owned());
-    let found = text.lines().take_while(|line| line.starts_with('#')).find_map(value_of).unwrap_or_default();
-    if found.trim_end() == expected { Ok(()) } else { Err(SwcError::Header { key, found, expected }) }
+    let found = header_value(text, key).unwrap_or_default();
+    if found == expected { Ok(()) } else { Err(SwcError::Header { key, found: found.to_owned(), expected }) }
 }
 
 /// A finite number with so many significant digits, without trailing zeros; never `-0`.

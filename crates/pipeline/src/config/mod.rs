@@ -9,9 +9,7 @@ mod place;
 
 use std::path::{Path, PathBuf};
 
-use espalier_embed::PoseMode;
 use espalier_model::diagnose::{Class, Diagnose, ParamError};
-use espalier_render::Compass;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -122,7 +120,7 @@ impl Config {
         let alone: Self = toml::from_str(text).map_err(|error| source.parse_error(&error))?;
         let config = if overrides.is_empty() { alone } else { source.overridden()? };
         config.validate(&source)?;
-        Ok(config.with_defaults_of_input())
+        Ok(config)
     }
 
     /// The config of a run that is given only its input, under `overrides`.
@@ -149,23 +147,6 @@ impl Config {
     pub fn to_toml(&self) -> String {
         // Plain structs of numbers, strings, enums and tables: serialisation cannot fail.
         toml::to_string(self).unwrap_or_default()
-    }
-
-    /// The config with the defaults that hang on the kind of input filled in, so that the resolved copy has them.
-    fn with_defaults_of_input(mut self) -> Self {
-        // Only a scan says where right and left of the patient are, and what is up.
-        let (compass, pose) = if self.input.is_traced() {
-            (Compass::Axes, PoseMode::RootOnTop)
-        } else {
-            (Compass::Anatomical, PoseMode::View)
-        };
-        if self.render.compass == Compass::Auto {
-            self.render.compass = compass;
-        }
-        if self.embed.pose == PoseMode::Auto {
-            self.embed.pose = pose;
-        }
-        self
     }
 
     fn validate(&self, source: &place::SourceText<'_>) -> Result<(), Box<ConfigError>> {
