@@ -10,8 +10,13 @@
 //! and, if it is long enough for that, where its own spheres are clear of those of the fork's other lines.
 //! 2. The fork is the point nearest to all of them, each weighted by the inverse of its variance; the skeleton's own
 //! fork counts as one measurement with a standard deviation of its radius, so that axes that meet badly change little.
-//! 3. The move is bounded by `MAX_MOVE` radii, by a share of each line's length, and by the mask.
-//! 4. Samples between the fork and the fitted stretch give way to the straight connection.
+//! 3. The axes of two daughters in a wide parent meet far up in it, where it still is one vessel: as long as the
+//! tubes of all daughters run inside of the parent's, the fork follows them up for no more than the parent's radius.
+//! 4. The move is bounded by `MAX_MOVE` radii, by a share of each line's length, and by the mask.
+//! 5. Samples between the fork and the fitted stretch, and those that do not lie ahead of the fork's new sphere, give way
+//! to the straight connection.
+//! 6. After smoothing, [`clear_spheres`] takes away what a line does inside of the sphere of a fork at its ends: the
+//! first sample that counts is the first beyond, so no short edge at a fork bears a turn that is a voxel's.
 //! **Guarantees** a fork does not leave the mask by this step; lines keep their ends and order.
 //! **Source** own; the idea that a bifurcation is best located from outside of it is common in vessel analysis.
 //! **Cost** O(N + Σ n²) for N samples, the sum over the forks and n the samples of all lines at a fork within
@@ -56,8 +61,17 @@ struct LineEnd {
     target: Sample,
     /// By how much the fork moved.
     shift: DVec3,
-    /// How many samples give way to the straight connection; `None` if the line's axis is not known.
-    merged: Option<usize>,
+    /// The samples that give way to the straight connection; `None` if the line's axis is not known.
+    merged: Option<Merged>,
+}
+
+/// What gives way at one end of a line.
+#[derive(Clone, Copy)]
+struct Merged {
+    /// How many samples at least.
+    n_samples: usize,
+    /// The direction of the line's axis away from the fork: the samples that are not a radius ahead give way, too.
+    ahead: DVec3,
 }
 
 /// Moves all forks of three or more lines; returns the mean distance moved in mm.
@@ -82,7 +96,8 @@ pub(crate) fn relocate(outline: &mut Outline, mask: &Mask) -> f64 {
         total_mm += shift.length();
         outline.hubs[hub] = Hub { sample: target, ..outline.hubs[hub] };
         for arm in arms {
-            let merged = arm.fit.as_ref().map(|(first, _)| *first);
+            let merged =
+                arm.fit.as_ref().map(|&(first, fit)| Merged { n_samples: first, ahead: fit.direction });
             ends[arm.line][usize::from(!arm.is_outgoing)] = Some(LineEnd { target, shift, merged });
         }
     }
@@ -175,6 +190,11 @@ fn meeting_point(fork: Sample, arms: &[Arm], scatter_mm: f64, mask: &Mask) -> Sa
     }
     let mut shift = normal.inverse() * right - fork.position_mm;
 
+    let parent_mm = fits.iter().map(|fit| fit.radius_mm).fold(0.0, f64::max);
+    if fits.len() == arms.len() {
+        let up_to_mm = (shift.length() - shared_mm(&fits)).max(parent_mm);
+        shift = shift.clamp_length_max(up_to_mm);
+    }
     let shortest_mm = arms.iter().map(|arm| arm.length_mm).fold(f64::INFINITY, f64::min);
     let limit_mm = (MAX_SHARE * shortest_mm).min(MAX_MOVE * fork.radius_mm);
     shift = shift.clamp_length_max(limit_mm);
@@ -185,8 +205,39 @@ fn meeting_point(fork: Sample, arms: &[Arm], scatter_mm: f64, mask: &Mask) -> Sa
             return fork;
         }
     }
-    let thickest_mm = fits.iter().map(|fit| fit.radius_mm).fold(0.0, f64::max);
-    Sample { position_mm: fork.position_mm + shift, radius_mm: thickest_mm }
+    Sample { position_mm: fork.position_mm + shift, radius_mm: parent_mm }
+}
+
+/// For how long, in mm along the axis of the thickest arm from where the axes meet, the tubes of all other arms run
+/// inside of its own. It is 0 where one of them is as thick or leads aside.
+fn shared_mm(fits: &[&Fit]) -> f64 {
+    let thicker = |a: usize, b: usize| if fits[b].radius_mm > fits[a].radius_mm { b } else { a };
+    let parent = (0..fits.len()).fold(0, thicker);
+    let inside_mm = |fit: &Fit| {
+        let cos = fit.direction.dot(-fits[parent].direction);
+        let sin = (1.0 - cos * cos).max(0.0).sqrt();
+        (fits[parent].radius_mm - fit.radius_mm) * cos.max(0.0) / sin.max(f64::EPSILON)
+    };
+    (0..fits.len()).filter(|&i| i != parent).map(|i| inside_mm(fits[i])).fold(f64::INFINITY, f64::min)
+}
+
+/// Takes away the samples of each line inside of the spheres of the forks at its ends.
+pub(crate) fn clear_spheres(outline: &mut Outline) {
+    let n_lines: Vec<usize> = outline.incidence().iter().map(Vec::len).collect();
+    for line in &mut outline.lines {
+        let last = line.samples.len() - 1;
+        let n_inside = |hub: usize, inwards: &mut dyn Iterator<Item = &Sample>| {
+            let fork = outline.hubs[hub].sample;
+            let is_inside = |s: &&Sample| s.position_mm.distance(fork.position_mm) < fork.radius_mm;
+            if n_lines[hub] > 2 { inwards.take_while(is_inside).count().max(1) } else { 1 }
+        };
+        let first = n_inside(line.from, &mut line.samples.iter());
+        let beyond = (last + 1).saturating_sub(n_inside(line.to, &mut line.samples.iter().rev()));
+        let mut kept = vec![line.samples[0]];
+        kept.extend_from_slice(line.samples.get(first..beyond).unwrap_or_default());
+        kept.push(line.samples[last]);
+        line.samples = kept;
+    }
 }
 
 /// A line led to the new places of the forks at its ends.
@@ -206,12 +257,19 @@ fn led_to(samples: &[Sample], [start, end]: &[Option<LineEnd>; 2]) -> Vec<Sample
     }
 
     // Where it is known, what lies before it gives way; if both ends claim the same samples, all between them does.
-    let n_merged = |end: &Option<LineEnd>| end.as_ref().map_or(1, |end| end.merged.unwrap_or(1).max(1));
-    let first = n_merged(start);
-    let last = led.len().saturating_sub(n_merged(end)).max(first);
+    let first = n_merged(start, &mut led.iter());
+    let last = led.len().saturating_sub(n_merged(end, &mut led.iter().rev())).max(first);
     let end_sample = |end: &Option<LineEnd>, sample: Sample| end.as_ref().map_or(sample, |end| end.target);
     let mut line = vec![end_sample(start, led[0])];
     line.extend_from_slice(led.get(first..last).unwrap_or_default());
     line.push(end_sample(end, led[led.len() - 1]));
     line
+}
+
+/// How many samples give way at an end of a line, the end itself among them; the samples are counted from there.
+fn n_merged(end: &Option<LineEnd>, samples: &mut dyn Iterator<Item = &Sample>) -> usize {
+    let Some(LineEnd { target, merged: Some(merged), .. }) = end else { return 1 };
+    let is_ahead = |s: &Sample| (s.position_mm - target.position_mm).dot(merged.ahead) >= target.radius_mm;
+    let n_behind = samples.enumerate().find(|&(i, s)| i >= merged.n_samples && is_ahead(s)).map(|(i, _)| i);
+    n_behind.unwrap_or(merged.n_samples).max(1)
 }

@@ -5,7 +5,7 @@
 //! | 1 | `adjacency`, `graph` | 26-neighbours; junction clusters become one hub, chains become pieces |
 //! | 2 | `components` | one component is the tree |
 //! | 3 | `loops` | every loop is opened at its thinnest place |
-//! | 4 | `living`, `prune`, `root` | spurs go, the root is chosen |
+//! | 4 | `living`, `prune`, `redundant`, `root` | spurs go, the root is chosen |
 //! | 5 | `outline` | lines between root, forks and tips |
 //! | 6 | `forks` | forks move to where the branches' axes meet |
 //! | 7 | `tips` | free ends are set where the organ ends |
@@ -43,6 +43,7 @@ mod merge;
 mod outline;
 mod params;
 mod prune;
+mod redundant;
 mod resample;
 mod root;
 mod smooth;
@@ -94,8 +95,8 @@ pub fn build(
     let (mut graph, _) = components::select(voxel_graph, params, &mut ledger)?;
     loops::open(&mut graph, params, &mut ledger)?;
     let mut living = living::Living::new(&graph);
-    let is_protected = root::protected_tips(&mut living, params);
-    prune::prune(&mut living, &is_protected, params, &mut ledger);
+    let protection = root::protected_tips(&mut living, params);
+    prune::prune(&mut living, &protection, params, &mut ledger);
     let choice = root::choose(&living, params);
     if let Some(runner_up) = choice.runner_up {
         let names = ["root_runner_up_x_mm", "root_runner_up_y_mm", "root_runner_up_z_mm"];
@@ -110,6 +111,7 @@ pub fn build(
     tips::set(&mut outline, mask, params.tips, &mut ledger);
     smooth::space_evenly(&mut outline, mask.grid());
     smooth::smooth(&mut outline, mask.grid(), params.smooth_voxels);
+    forks::clear_spheres(&mut outline);
 
     let resolution_mm = RESOLUTION * mask.grid().spacing_mm().min_element();
     let nodes = merge::merge_near(&outline_nodes(&outline, resolution_mm, &mut ledger), &mut ledger);

@@ -81,6 +81,11 @@ impl<'g> Living<'g> {
         Some((run, if first == tip { last } else { first }))
     }
 
+    /// A name for the run that a piece is part of, the same for all of its pieces now; `None` if the piece was removed.
+    pub(crate) fn run_of(&mut self, piece: usize) -> Option<usize> {
+        if self.is_live[piece] { Some(self.sets.find(piece)) } else { None }
+    }
+
     /// The samples of a piece as met when coming from `hub`, both ends included, and the hub at the other end.
     pub(crate) fn polyline_from(&self, hub: usize, piece: usize) -> (Vec<Sample>, usize) {
         let mut polyline = self.graph.polyline(piece);

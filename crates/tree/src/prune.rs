@@ -1,12 +1,13 @@
-//! Spurs: short terminal branches that thinning grew on bumps of the surface.
+//! Spurs: short terminal branches that thinning grew on bumps of the surface, and branches inside of others.
 //!
 //! **Input** a graph without cycles. **Output** the same without spurs; a ledger entry for each.
 //! **Steps** 1. A terminal branch is a spur if it is shorter than `prune_factor` × the radius at its fork, or than
 //! `prune_min_mm`; or if it winds, being less than twice that long, without getting that far from its fork. A stub
-//! of an opened loop must be `STUB_FACTOR` times as long to stay: most of them are holes in a wall. 2. Take the
+//! of an opened loop must be `STUB_FACTOR` times as long to stay: most of them are holes in a wall. However long, a
+//! branch is redundant if it runs in the lumen of others (see [`redundant`](crate::redundant)). 2. Take the
 //! shortest spur away. 3. If two branches are left at its fork, they are one branch now, with their joint length.
 //! 4. Again, until there is no spur.
-//! **Guarantees** at least two branches stay at every fork that was one; protected tips stay; the result does not
+//! **Guarantees** at least two branches stay at every fork that was one; the root of the user's policy stays, and cut-off vessels unless redundant; the result does not
 //! depend on the order of the voxels but for exact ties, which go to the lower hub index.
 //! **Cost** O(B log B) in branches.
 
@@ -15,21 +16,28 @@ use std::collections::BinaryHeap;
 
 use espalier_model::{Ledger, LedgerEntry, LedgerKind};
 
+use crate::graph::Sample;
 use crate::living::Living;
 use crate::params::Params;
+use crate::redundant::Spheres;
+use crate::root::Protection;
 
 /// How much longer than other terminal branches a stub of an opened loop must be.
 const STUB_FACTOR: f64 = 2.0;
 /// A branch of at most this multiple of the limit may be a spur that winds.
 const WINDING: f64 = 2.0;
 
-/// Prunes all spurs whose tips are not protected; returns how many there were.
+/// Prunes all spurs and redundant branches whose tips are not protected; returns how many there were.
 pub(crate) fn prune(
     living: &mut Living<'_>,
-    is_protected: &[bool],
+    protection: &[Protection],
     params: &Params,
     ledger: &mut Ledger,
 ) -> usize {
+    if params.prune_factor <= 0.0 && params.prune_min_mm <= 0.0 {
+        return 0;
+    }
+    let spheres = Spheres::of(living);
     let mut n_pruned = 0;
     // Lengths are at least 0, so their bits order as they do.
     let mut shortest_first = BinaryHeap::new();
@@ -39,7 +47,7 @@ pub(crate) fn prune(
         }
     }
     while let Some(Reverse((length_bits, tip))) = shortest_first.pop() {
-        if living.degree(tip) != 1 || is_protected[tip] {
+        if living.degree(tip) != 1 || protection[tip] == Protection::Root {
             continue;
         }
         let Some((run, fork)) = living.run_at_tip(tip) else { continue };
@@ -47,24 +55,14 @@ pub(crate) fn prune(
         if is_outdated || living.degree(fork) < 3 {
             continue;
         }
-        let fork_radius_mm = living.graph.hubs[fork].sample.radius_mm;
-        let stub_factor = if living.graph.hubs[tip].is_stub { STUB_FACTOR } else { 1.0 };
-        let limit_mm = stub_factor * (params.prune_factor * fork_radius_mm).max(params.prune_min_mm);
-        if !is_spur(living, tip, run.length_mm, limit_mm) {
+        let Some(reason) =
+            reason_to_prune(living, (tip, fork), run.length_mm, protection[tip], (&spheres, params))
+        else {
             continue;
-        }
-
-        let sample = living.graph.hubs[tip].sample;
-        ledger.0.push(LedgerEntry {
-            kind: LedgerKind::SpurPruned,
-            position_mm: sample.position_mm,
-            radius_mm: sample.radius_mm,
-            length_mm: run.length_mm,
-            reason: format!(
-                "terminal branch of {:.3} mm at a fork of radius {fork_radius_mm:.3} mm; the limit there is {limit_mm:.3} mm",
-                run.length_mm
-            ),
-        });
+        };
+        let Sample { position_mm, radius_mm } = living.graph.hubs[tip].sample;
+        let kind = LedgerKind::SpurPruned;
+        ledger.0.push(LedgerEntry { kind, position_mm, radius_mm, length_mm: run.length_mm, reason });
         living.remove_at_tip(tip);
         n_pruned += 1;
         // If the fork dissolved, branches that ended there are longer now: look at them again.
@@ -76,6 +74,29 @@ pub(crate) fn prune(
         }
     }
     n_pruned
+}
+
+/// Why the branch from a fork to a tip is to go; `None` if it is to stay.
+fn reason_to_prune(
+    living: &mut Living<'_>,
+    (tip, fork): (usize, usize),
+    length_mm: f64,
+    protection: Protection,
+    (spheres, params): (&Spheres, &Params),
+) -> Option<String> {
+    let fork_radius_mm = living.graph.hubs[fork].sample.radius_mm;
+    let stub_factor = if living.graph.hubs[tip].is_stub { STUB_FACTOR } else { 1.0 };
+    let limit_mm = stub_factor * (params.prune_factor * fork_radius_mm).max(params.prune_min_mm);
+    if protection == Protection::Free && is_spur(living, tip, length_mm, limit_mm) {
+        return Some(format!(
+            "terminal branch of {length_mm:.3} mm at a fork of radius {fork_radius_mm:.3} mm; the limit there is {limit_mm:.3} mm"
+        ));
+    }
+    let redundant = spheres.redundant_at(living, tip)?;
+    Some(format!(
+        "terminal branch of {length_mm:.3} mm in the lumen of others: beyond its fork's radius of {fork_radius_mm:.3} mm, {} of {} places are inside their spheres",
+        redundant.n_inside, redundant.n_beyond
+    ))
 }
 
 /// Whether the branch at a tip is shorter than the limit, or winds without leaving it.

@@ -8,7 +8,8 @@
 //! are chosen only if there is nothing else.
 //! **Why two times?** Spurs are no roots, so the choice comes after pruning; but a trunk can be so short that it
 //! looks like a spur. So what the user's policy points at is protected from pruning, and so is a tip where the
-//! scan's border cuts a vessel off at more than half of its fork's radius: no spur ends that way.
+//! scan's border cuts a vessel off at more than half of its fork's radius: no spur ends that way, unless it runs in the
+//! lumen of another branch, such as the second of two centrelines in a wide trunk.
 
 use std::cmp::Ordering;
 
@@ -30,19 +31,32 @@ pub(crate) struct Choice {
     pub(crate) runner_up: Option<usize>,
 }
 
-/// For each hub whether it is a tip that pruning must leave.
-pub(crate) fn protected_tips(living: &mut Living<'_>, params: &Params) -> Vec<bool> {
-    let mut is_protected = vec![false; living.graph.hubs.len()];
+/// What pruning must leave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Protection {
+    /// Nothing: not a tip, or a tip like others.
+    Free,
+    /// Not to be taken for being short: the scan cuts a vessel off there.
+    CutOff,
+    /// Not to be taken at all: the user's policy points at it.
+    Root,
+}
+
+/// For each hub what pruning must respect there.
+pub(crate) fn protected_tips(living: &mut Living<'_>, params: &Params) -> Vec<Protection> {
+    let mut protection = vec![Protection::Free; living.graph.hubs.len()];
     for tip in living.tips() {
         let hub = living.graph.hubs[tip];
         let fork_radius_mm =
             living.run_at_tip(tip).map_or(0.0, |(_, fork)| living.graph.hubs[fork].sample.radius_mm);
-        is_protected[tip] = hub.is_at_border && hub.sample.radius_mm >= CUT_OFF_SHARE * fork_radius_mm;
+        if hub.is_at_border && hub.sample.radius_mm >= CUT_OFF_SHARE * fork_radius_mm {
+            protection[tip] = Protection::CutOff;
+        }
     }
     if params.root_mm.is_some() || params.root == Root::Superior {
-        is_protected[choose(living, params).root] = true;
+        protection[choose(living, params).root] = Protection::Root;
     }
-    is_protected
+    protection
 }
 
 /// The root by policy.

@@ -1,0 +1,102 @@
+//! Branches inside of other branches.
+//!
+//! Thinning a wide or flat lumen, or opening a loop about a hole in its wall, can leave two centrelines side by side in
+//! one vessel. Such a branch may be long, so its length does not betray it; that it runs in the lumen of others does.
+//!
+//! **Input** the tree of pieces, and a tip. **Output** how much of the branch at the tip lies in the spheres of the rest.
+//! **Steps** 1. Sort all samples into cubes of the largest diameter's half. 2. For each sample of the branch that is
+//! beyond its fork's sphere, look in the 27 cubes about it for a sphere of another run that contains it.
+//! 3. Stop as soon as too many are outside.
+//! **Guarantees** a branch all of which lies inside of its fork's sphere is not called redundant here: it may be what a
+//! scan left of a trunk. As branches go, the share of the others only falls.
+//! **Cost** O(N log N) for N samples, and for each sample looked at O(log N + those in 27 cubes).
+
+use std::collections::BTreeMap;
+
+use glam::{DVec3, IVec3};
+
+use crate::graph::Sample;
+use crate::living::Living;
+
+/// The share of its samples beyond its fork's sphere that a redundant branch has in the spheres of others.
+const MIN_SHARE: f64 = 0.9;
+
+/// All samples of a graph by place.
+pub(crate) struct Spheres {
+    cube_mm: f64,
+    /// (piece, sample) in each cube.
+    cubes: BTreeMap<[i32; 3], Vec<(usize, Sample)>>,
+}
+
+/// A branch that runs in the lumen of others.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Redundant {
+    /// How many of its samples are beyond its fork's sphere.
+    pub(crate) n_beyond: usize,
+    /// How many of those are inside of other branches' spheres.
+    pub(crate) n_inside: usize,
+}
+
+impl Spheres {
+    /// Sorts the samples of a graph.
+    pub(crate) fn of(living: &Living<'_>) -> Self {
+        let n_pieces = living.graph.pieces.len();
+        let all = || {
+            (0..n_pieces).flat_map(|piece| living.graph.polyline(piece).into_iter().map(move |s| (piece, s)))
+        };
+        let cube_mm = all().map(|(_, s)| s.radius_mm).fold(0.0, f64::max);
+        let mut spheres = Self { cube_mm, cubes: BTreeMap::new() };
+        if cube_mm > 0.0 {
+            for (piece, sample) in all() {
+                spheres
+                    .cubes
+                    .entry(spheres.cube_of(sample.position_mm).to_array())
+                    .or_default()
+                    .push((piece, sample));
+            }
+        }
+        spheres
+    }
+
+    fn cube_of(&self, position_mm: DVec3) -> IVec3 {
+        (position_mm / self.cube_mm).floor().as_ivec3()
+    }
+
+    /// Whether a place is inside of a sphere of another run than this one.
+    fn has_other(&self, living: &mut Living<'_>, run: usize, position_mm: DVec3) -> bool {
+        let center = self.cube_of(position_mm);
+        (0..27).any(|i| {
+            let cube = center + IVec3::new(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+            self.cubes.get(&cube.to_array()).is_some_and(|samples| {
+                samples.iter().any(|(piece, s)| {
+                    s.position_mm.distance(position_mm) < s.radius_mm
+                        && living.run_of(*piece).is_some_and(|other| other != run)
+                })
+            })
+        })
+    }
+
+    /// Whether the branch at a tip runs in the lumen of others.
+    pub(crate) fn redundant_at(&self, living: &mut Living<'_>, tip: usize) -> Option<Redundant> {
+        let piece = living.pieces_at(tip).next()?;
+        let run = living.run_of(piece)?;
+        let (branch, fork, _) = living.branch_from(tip, piece);
+        let fork = living.graph.hubs[fork].sample;
+        let beyond: Vec<Sample> = branch
+            .into_iter()
+            .filter(|s| s.position_mm.distance(fork.position_mm) > fork.radius_mm)
+            .collect();
+        let n_beyond = beyond.len();
+        let may_be_outside = ((1.0 - MIN_SHARE) * n_beyond as f64) as usize;
+        let mut n_outside = 0;
+        for sample in beyond {
+            if !self.has_other(living, run, sample.position_mm) {
+                n_outside += 1;
+                if n_outside > may_be_outside {
+                    return None;
+                }
+            }
+        }
+        (n_beyond > 0).then_some(Redundant { n_beyond, n_inside: n_beyond - n_outside })
+    }
+}
