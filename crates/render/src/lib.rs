@@ -77,7 +77,7 @@ pub struct Rendered {
 /// `position.X Y Z` (RAS+ mm), `loss.angle` (degrees), `loss.length` (share); where `A` is 0, ids are −1 and all
 /// else is 0.
 ///
-/// Radii that cover the picture dozens of times over, as in a wrong unit, are not drawn: it shows lines then, its
+/// Radii that cover the picture several times over, as in a wrong unit, are not drawn: it shows lines then, its
 /// heading says so, and the report warns with `W-RENDER-THICK`.
 ///
 /// # Errors
@@ -126,8 +126,9 @@ pub fn render(
     })
 }
 
-/// How often the cones may cover a picture; round ones of the widths that organs have cover it less than once.
-const MAX_LAYERS: f64 = 48.0;
+/// How often the cones may cover a picture: organs at their true widths reach 0.2 to 1.2, and each further layer costs as
+/// much time as such a picture.
+const MAX_LAYERS: f64 = 4.0;
 
 /// Whether edges can pass in front of each other.
 #[derive(Clone, Copy)]
@@ -260,7 +261,7 @@ fn report(tree: &Tree, [map, global]: [&Sheet; 2], pixels: &[Pixel]) -> Report {
             report.warn(
                 "W-RENDER-THICK",
                 format!(
-                    "the {name} is drawn as lines: with their radii the edges would cover it about {n_layers:.0} \
+                    "the {name} is drawn as lines: with their radii the edges would cover it about {n_layers:.1} \
                      times over; if the radii are in another unit, set input.radius_scale or render.width_scale"
                 ),
             );
