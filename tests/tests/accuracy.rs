@@ -6,6 +6,9 @@
 //! **Branch angle** between straight lines fitted to the branches, from one radius beyond the fork over 4 radii: outside
 //! of the fork's sphere, where the branches are tubes of their own.
 //! **Radius** at every node of the tree.
+//! **Sharp corners** are cut by the medial axis, at a right angle by 0.26 radii, whatever the grid. The allowed error of the
+//! length is for legs long enough not to feel it: a right angle is held to it here with 25 radii in all. Legs of 6 radii on
+//! slices at the limit of two voxels to a radius came out 2.9 % short; that is a known limit, not tested away.
 //! **Grids** cubes of 0.8 mm and slices of 3.5 mm with pixels of 0.7 mm; tubes along the axes and oblique to all of
 //! them, centred on voxels and between them.
 #![allow(clippy::print_stdout, reason = "the table is what the test is looked at for")]

@@ -28,6 +28,10 @@
 //! # Ok::<(), espalier_tree::Error>(())
 //! ```
 //!
+//! **Limits** The centres of inscribed spheres cut a sharp corner, at a right angle by 0.26 radii, and nothing here puts it
+//! back: with legs of 6 radii, on slices as thick as half a radius, a right angle came out 2.9 % short. Lengths are
+//! good to 1 % for corners of legs of about 12 radii or more, and for round bends of 3 radii.
+//!
 //! **Guarantees** same input and parameters, same tree; no recursion; ties go to the lower index, hence to storage order.
 
 mod adjacency;

@@ -7,9 +7,10 @@
 //! branch is redundant if it runs in the lumen of others (see [`redundant`](crate::redundant)). 2. Take the
 //! shortest spur away. 3. If two branches are left at its fork, they are one branch now, with their joint length.
 //! 4. Again, until there is no spur.
-//! **Guarantees** at least two branches stay at every fork that was one; the root of the user's policy stays, and cut-off vessels unless redundant; the result does not
-//! depend on the order of the voxels but for exact ties, which go to the lower hub index.
-//! **Cost** O(B log B) in branches.
+//! **Guarantees** at least two branches stay at every fork that was one; the root of the user's policy stays, and cut-off
+//! vessels do unless redundant; the result does not depend on the order of the voxels but for exact ties, which go to
+//! the lower hub index.
+//! **Cost** O(B log B) in branches, and what `redundant` takes.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

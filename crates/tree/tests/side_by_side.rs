@@ -64,18 +64,31 @@ fn fork_of_a_wide_parent_moves_by_no_more_than_its_radius() {
     assert!((51.5..=61.0).contains(&y), "the fork is at y = {y}");
 }
 
+/// Two forks 6 mm apart in spheres of radius 4, and between them a staircase of voxels.
+fn linked_forks() -> Places {
+    let mut places = chain(&[[40, 10, 12], [40, 50, 12], [40, 53, 15], [40, 56, 12]], 4.0);
+    places.extend(chain(&[[40, 50, 12], [70, 80, 12]], 4.0));
+    places.extend(chain(&[[40, 56, 12], [14, 82, 12]], 4.0));
+    places.extend(chain(&[[40, 56, 12], [40, 100, 12]], 4.0));
+    places
+}
+
 #[test]
 fn no_short_edge_at_a_fork_is_kinked() {
-    let tree = built(&iliacs(), [80, 115, 25]).tree;
-    let fork = fork_of(&tree);
-    let arms = arms(&tree, fork);
-    assert_eq!(arms.len(), 3);
-    for arm in arms {
-        let edge = arm[1] - arm[0];
-        assert!(edge.length() >= 0.9 * tree.nodes()[fork].radius_mm, "first edge of {} mm", edge.length());
-        let Some(next) = arm.get(2) else { continue };
-        let turn = edge.angle_between(*next - arm[1]).to_degrees();
-        assert!(turn < 15.0, "a turn of {turn}° after {} mm", edge.length());
+    for (places, n_forks) in [(iliacs(), 1), (linked_forks(), 2)] {
+        let tree = built(&places, [80, 115, 25]).tree;
+        let forks: Vec<usize> = (0..tree.n_nodes()).filter(|&node| tree.children(node).len() > 1).collect();
+        assert_eq!(forks.len(), n_forks);
+        for (fork, arm) in
+            forks.iter().flat_map(|&fork| arms(&tree, fork).into_iter().map(move |a| (fork, a)))
+        {
+            // A straight branch has no turn, however short it is.
+            let [from, through, to, ..] = arm[..] else { continue };
+            let (length_mm, radius_mm) = (from.distance(through), tree.nodes()[fork].radius_mm);
+            assert!(length_mm >= 0.9 * radius_mm, "first edge of {length_mm} mm, radius {radius_mm} mm");
+            let turn = (through - from).angle_between(to - through).to_degrees();
+            assert!(turn < 20.0, "a turn of {turn}° after {length_mm} mm");
+        }
     }
 }
 
