@@ -105,7 +105,7 @@ fn truncated_gzip() {
 #[test]
 fn empty_mask() {
     let folder = folder_with("empty.nii.gz", &uniform_volume(false));
-    refused(&folder, &["run", "empty.nii.gz"], 3, &["error[E-VOLUME", "hint"]);
+    refused(&folder, &["run", "empty.nii.gz"], 3, &["error[E-VOLUME", "empty.nii.gz", "hint"]);
 }
 
 #[test]

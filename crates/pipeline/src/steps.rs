@@ -76,8 +76,13 @@ fn phantom(step: &mut Step<'_>) -> Result<Outcome, Error> {
 
 fn volume(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let (scan, mut report) = step.take(Artifacts::volume)?;
-    let segmented =
-        espalier_volume::segment(&scan, &step.config.volume).map_err(|error| step.failed(error))?;
+    let segmented = espalier_volume::segment(&scan, &step.config.volume).map_err(|error| {
+        // The stage knows the volume, not where it came from.
+        match step.artifacts.files.get(&Artifact::Volume) {
+            Some(path) => Error::file(path, error),
+            None => step.failed(error),
+        }
+    })?;
     let mask = on_stored_grid(segmented.mask).map_err(|error| step.failed(error))?;
     let n_foreground = mask.n_foreground();
     let mut line = format!(
