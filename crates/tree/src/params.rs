@@ -102,8 +102,9 @@ pub struct Params {
     /// A point in RAS+ mm; if given, the tip nearest to it is the root, whatever `root` says. Default none.
     pub root_mm: Option<[f64; 3]>,
     /// A terminal branch shorter than this multiple of the radius at its fork is a spur. Dimensionless, 0 to 10;
-    /// 0, with `prune_min_mm` 0, prunes none, not even branches in the lumen of others. Default 1.5: on phantoms it kept 98–100 % of the tips at 98–100 % precision, where one
-    /// length in mm for the whole tree destroys half of a small one. Larger prunes more.
+    /// 0, with `prune_min_mm` 0, prunes none, not even branches in the lumen of others. Default 1.5: on phantoms it
+    /// kept 98–100 % of the tips at 98–100 % precision, where one length in mm for the whole tree destroys half of a
+    /// small one. Larger prunes more.
     pub prune_factor: f64,
     /// A terminal branch shorter than this is a spur, whatever its fork's radius. In mm, at least 0. Default 0.
     /// Larger prunes more.
