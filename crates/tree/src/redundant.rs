@@ -7,8 +7,9 @@
 //! **Steps** 1. Sort all samples into cubes of the largest diameter's half. 2. For each sample of the branch that is
 //! beyond its fork's sphere, look in the 27 cubes about it for a sphere of another run that contains it.
 //! 3. Stop as soon as too many are outside.
-//! **Guarantees** a branch all of which lies inside of its fork's sphere is not called redundant here: it may be what a
-//! scan left of a trunk. As branches go, the share of the others only falls.
+//! **Guarantees** a branch all of which lies inside of its fork's sphere is called redundant here only if it has a twin:
+//! another that the scan cuts off there, and whose tip's sphere has this tip inside. Alone it may be what a scan left of a
+//! trunk. As branches go, the share of the others only falls.
 //! **Cost** O(N log N) for N samples, and for each sample looked at O(log N + those in 27 cubes).
 
 use std::collections::BTreeMap;
@@ -80,8 +81,8 @@ impl Spheres {
     pub(crate) fn redundant_at(&self, living: &mut Living<'_>, tip: usize) -> Option<Redundant> {
         let piece = living.pieces_at(tip).next()?;
         let run = living.run_of(piece)?;
-        let (branch, fork, _) = living.branch_from(tip, piece);
-        let fork = living.graph.hubs[fork].sample;
+        let (branch, fork_idx, _) = living.branch_from(tip, piece);
+        let fork = living.graph.hubs[fork_idx].sample;
         let beyond: Vec<Sample> = branch
             .into_iter()
             .filter(|s| s.position_mm.distance(fork.position_mm) > fork.radius_mm)
@@ -97,6 +98,18 @@ impl Spheres {
                 }
             }
         }
-        (n_beyond > 0).then_some(Redundant { n_beyond, n_inside: n_beyond - n_outside })
+        (n_beyond > 0 || has_twin(living, tip, fork_idx))
+            .then_some(Redundant { n_beyond, n_inside: n_beyond - n_outside })
     }
+}
+
+/// Whether another branch of a fork ends at the border of the scan with a sphere that contains this tip.
+fn has_twin(living: &mut Living<'_>, tip: usize, fork: usize) -> bool {
+    let tip_mm = living.graph.hubs[tip].sample.position_mm;
+    let pieces: Vec<usize> = living.pieces_at(fork).collect();
+    pieces.into_iter().map(|piece| living.branch_from(fork, piece).1).any(|end| {
+        let hub = living.graph.hubs[end];
+        let is_other = end != tip && living.degree(end) == 1 && hub.is_at_border;
+        is_other && hub.sample.position_mm.distance(tip_mm) < hub.sample.radius_mm
+    })
 }

@@ -123,6 +123,11 @@ fn twin_of_the_root_goes_though_the_scan_cuts_it_off() {
     assert_eq!((built.tree.branches().list().len(), built.tree.n_tips()), (1, 1));
     assert_eq!(built.ledger.n_of(LedgerKind::SpurPruned), 1);
 
+    // So it does where thinning ended before both, inside of the sphere of their fork.
+    let mut places = chain(&[[27, 5, 9], [30, 12, 9], [30, 62, 9]], 8.0);
+    places.extend(chain(&[[33, 5, 9], [30, 12, 9]], 8.0));
+    assert_eq!(self::built(&places, [60, 70, 19]).tree.branches().list().len(), 1);
+
     // Two vessels that the scan cuts off side by side are both there.
     let mut places = chain(&[[20, 0, 9], [20, 10, 9], [30, 20, 9], [30, 62, 9]], 6.0);
     places.extend(chain(&[[40, 0, 9], [40, 10, 9], [30, 20, 9]], 6.0));
