@@ -94,6 +94,11 @@ fn reason_to_prune(
         ));
     }
     let redundant = spheres.redundant_at(living, tip)?;
+    if redundant.n_beyond == 0 {
+        return Some(format!(
+            "terminal branch of {length_mm:.3} mm inside of its fork's radius of {fork_radius_mm:.3} mm, its tip in the sphere of a twin at the border of the scan"
+        ));
+    }
     Some(format!(
         "terminal branch of {length_mm:.3} mm in the lumen of others: beyond its fork's radius of {fork_radius_mm:.3} mm, {} of {} places are inside their spheres",
         redundant.n_inside, redundant.n_beyond
