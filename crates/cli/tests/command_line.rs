@@ -136,6 +136,15 @@ fn value_out_of_range() {
 }
 
 #[test]
+fn value_of_the_wrong_type() {
+    let config = "schema = 1\nname = \"x\"\n[input]\nphantom = \"neuron\"\n[embed]\nw_angle = \"three\"\n";
+    let folder = folder_with("type.toml", config.as_bytes());
+    refused(&folder, &["run", "type.toml"], 2, &["type.toml:6", "\"three\"", "expected f64"]);
+    let folder = folder_with("latin.toml", b"schema = 1\nname = \"caf\xe9\"\n");
+    refused(&folder, &["run", "latin.toml"], 2, &["latin.toml", "UTF-8"]);
+}
+
+#[test]
 fn wrong_usage() {
     let folder = tempfile::tempdir().expect("temporary folder");
     refused(&folder, &["run"], 2, &["Usage"]);

@@ -137,7 +137,8 @@ fn suggestion(message: &str) -> String {
     )
 }
 
+/// The first line; of an unknown name without the list of legal ones, which the hint has.
 fn first_line(message: &str) -> &str {
     let line = message.lines().next().unwrap_or_default();
-    line.split(", expected").next().unwrap_or(line)
+    if line.starts_with("unknown") { line.split(", expected").next().unwrap_or(line) } else { line }
 }
