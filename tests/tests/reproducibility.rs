@@ -141,6 +141,23 @@ fn a_run_from_the_middle_keeps_to_the_settings_it_builds_on() {
 }
 
 #[test]
+fn a_run_from_the_middle_keeps_to_its_input_whatever_its_name() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let scan = |patient: &str, tip: f64| {
+        let path = folder.path().join(patient).join("traced.swc");
+        fs::create_dir_all(path.parent().expect("a folder")).expect("folder");
+        let text = format!("1 1 0 0 0 1 -1\n2 3 0 0 9 1 1\n3 3 4 0 {tip} 1 2\n4 3 -4 1 15 1 2\n");
+        fs::write(&path, text).expect("write");
+        path
+    };
+    let (first, second, out) = (scan("first", 15.0), scan("second", 16.0), folder.path().join("out"));
+    run(&first, &out, &small_swarm(), 2).expect("a run");
+    let refusal = run_from(&second, &out, &small_swarm(), Stage::Embed).expect_err("another patient");
+    assert!(refusal.to_string().contains("second"), "{refusal}");
+    run_from(&first, &out, &small_swarm(), Stage::Embed).expect("the same patient");
+}
+
+#[test]
 fn another_input_leaves_nothing_of_the_former() {
     let (folder, _) = neuron_run(&[]);
     let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/y.nii.gz");

@@ -134,16 +134,6 @@ pub fn scalars(grid: &Grid, values: &[f32]) -> Result<Vec<u8>, NiftiOutError> {
     file.finish()
 }
 
-/// Whole numbers on a grid, x fastest, such as the branch that each voxel belongs to; 0 is background.
-///
-/// # Errors
-/// [`NiftiOutError`] if the grid does not fit the format or the values do not fit the grid.
-pub fn labels(grid: &Grid, values: &[u32]) -> Result<Vec<u8>, NiftiOutError> {
-    let mut file = File::new(grid, Scalar::U32, (1.0, 0.0), "espalier labels 1")?;
-    file.planes(values, |value| value.to_le_bytes())?;
-    file.finish()
-}
-
 /// A volume with its stored numbers and its scaling (rounded to single precision, as the format has it).
 ///
 /// # Errors

@@ -86,6 +86,16 @@ pub enum Error {
         /// The setting.
         difference: Box<Difference>,
     },
+    /// `--from` would build on results of another input.
+    #[error("--from {from} builds on what is there, which was not made from {path}", path = path.display())]
+    OtherInput {
+        /// The first stage to do.
+        from: Stage,
+        /// The input now.
+        path: PathBuf,
+        /// The first stage of a run from it.
+        first: Stage,
+    },
     /// `--from` lies behind `--to`.
     #[error("--from {from} comes after --to {to}")]
     EmptyRange {
@@ -165,6 +175,7 @@ impl Diagnose for Error {
             Self::NoSuchStage { .. } | Self::EmptyRange { .. } => "E-RUN-STAGES",
             Self::Input { .. } => "E-INPUT",
             Self::OtherSettings { .. } => "E-RUN-SETTINGS",
+            Self::OtherInput { .. } => "E-RUN-INPUT",
             Self::Read { .. } => "E-IO-READ",
             Self::TooLarge { .. } => "E-LIMIT-MEMORY",
             Self::Create { .. } => "E-IO-CREATE",
@@ -182,6 +193,7 @@ impl Diagnose for Error {
             | Self::EmptyRange { .. }
             | Self::Input { .. }
             | Self::OtherSettings { .. }
+            | Self::OtherInput { .. }
             | Self::Threads { .. } => Class::Usage,
             Self::MissingArtifact { .. } | Self::Read { .. } | Self::Write { .. } => Class::Io,
             Self::Altered { .. } | Self::Certificate { .. } => Class::Uncertified,
@@ -211,6 +223,7 @@ impl Diagnose for Error {
             Self::OtherSettings { difference, .. } => {
                 format!("run with --from {}, or set {} back", difference.stage, difference.key)
             }
+            Self::OtherInput { first, .. } => format!("run with --from {first}, or choose another folder with -o"),
             Self::Input { .. } => "set it to the folder of the data".to_owned(),
             Self::TooLarge { .. } => "allow more with --max-memory".to_owned(),
             Self::Create { .. } => "choose another folder with -o".to_owned(),

@@ -36,13 +36,25 @@ fn absolute(path: &Path) -> Option<String> {
 
 /// Writes `provenance/inputs.tsv`: the input's content, without its name, which may be a patient's.
 pub(crate) fn write_inputs(folder: &mut RunFolder, input: Option<&Path>) -> Result<(), Error> {
+    folder.write(INPUTS_FILE, inputs_tsv(input)?.as_bytes())
+}
+
+/// Whether the folder's results were made from a file of other content.
+pub(crate) fn is_other_input(folder: &RunFolder, input: &Path) -> Result<bool, Error> {
+    if !folder.path().join(INPUTS_FILE).exists() {
+        return Ok(false);
+    }
+    Ok(folder.read(INPUTS_FILE)? != inputs_tsv(Some(input))?.into_bytes())
+}
+
+fn inputs_tsv(input: Option<&Path>) -> Result<String, Error> {
     let mut table = Table::new(&["role", "bytes", "sha256"]);
     if let Some(path) = input {
         let (n_bytes, digest) =
             file_digest(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
         table.row(&[&"input", &n_bytes, &digest]);
     }
-    folder.write(INPUTS_FILE, table.into_string().as_bytes())
+    Ok(table.into_string())
 }
 
 #[derive(Serialize)]

@@ -113,7 +113,7 @@ impl Run<'_> {
     ) -> Result<String, Error> {
         let (config, events) = (&self.request.loaded.config, self.events);
         let mut settings = Settings::open(folder, config);
-        self.refuse_other_settings(&settings, stages)?;
+        self.refuse_other_settings(folder, &settings, stages)?;
         for &stage in stages {
             events(Event::Started { stage });
             let watch = Stopwatch::start();
@@ -144,7 +144,12 @@ impl Run<'_> {
 
     /// A run that begins in the middle builds on results that were made with the same settings, or not at all.
     /// Files that the user names are the user's to answer for.
-    fn refuse_other_settings(&self, settings: &Settings, stages: &[Stage]) -> Result<(), Error> {
+    fn refuse_other_settings(
+        &self,
+        folder: &RunFolder,
+        settings: &Settings,
+        stages: &[Stage],
+    ) -> Result<(), Error> {
         let available = stages_of(&self.source);
         let (Some(from), true) = (self.request.from, self.request.files.is_empty()) else { return Ok(()) };
         let earlier: Vec<Stage> =
@@ -152,10 +157,16 @@ impl Run<'_> {
         if earlier.is_empty() {
             return Ok(());
         }
-        match settings.difference(&earlier, available[0]) {
-            Some(difference) => Err(Error::OtherSettings { from, difference: Box::new(difference) }),
-            None => Ok(()),
+        if let Some(difference) = settings.difference(&earlier, available[0]) {
+            return Err(Error::OtherSettings { from, difference: Box::new(difference) });
         }
+        // Scans of many patients share one name; their content tells them apart. A scan that lies elsewhere now, or
+        // nowhere, is no reason to stop: nothing will be read from it.
+        let (Source::Volume(input) | Source::Tree(input)) = &self.source else { return Ok(()) };
+        if input.is_file() && provenance::is_other_input(folder, input)? {
+            return Err(Error::OtherInput { from, path: input.clone(), first: available[0] });
+        }
+        Ok(())
     }
 
     /// Removes what is not of this run: everything, if input or seed are others; else the files of stages that a run
@@ -175,8 +186,8 @@ impl Run<'_> {
 /// Writes a stage's files. If any of them is not what the folder had, the files of later stages go first: what they
 /// were made from is no more.
 fn write_outcome(folder: &mut RunFolder, stage: Stage, outcome: &steps::Outcome) -> Result<(), Error> {
-    let report = (format!("{}/report.json", stage.folder()), provenance::report_json(stage, &outcome.report));
-    let report = (report.0, report.1.into_bytes());
+    let report_json = provenance::report_json(stage, &outcome.report);
+    let report = (format!("{}/report.json", stage.folder()), report_json.into_bytes());
     let files: Vec<&(String, Vec<u8>)> = outcome.files.iter().chain([&report]).collect();
     let is_same = files.iter().all(|(file, bytes)| folder.vouches_for(file, bytes));
     let outdated: Vec<String> = Stage::ALL

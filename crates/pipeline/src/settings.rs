@@ -72,7 +72,8 @@ impl Settings {
                 None => _ = kept.remove(key),
             }
         }
-        folder.write(FILE, in_order(kept, wanted).as_bytes())
+        // Plain tables: serialisation cannot fail. They are sorted by key, however they were put together.
+        folder.write(FILE, toml::to_string(kept).unwrap_or_default().as_bytes())
     }
 }
 
@@ -84,13 +85,6 @@ fn portable(config: &Config) -> Table {
         *path = name.to_string_lossy().into_owned();
     }
     toml::from_str(&portable.to_toml()).unwrap_or_default()
-}
-
-/// The tables as TOML, in the order of the config's own keys whatever the order in which they came.
-fn in_order(kept: &Table, order: &Table) -> String {
-    let keys = order.keys().chain(kept.keys().filter(|key| !order.contains_key(*key)));
-    let ordered: Table = keys.filter_map(|key| Some((key.clone(), kept.get(key)?.clone()))).collect();
-    toml::to_string(&ordered).unwrap_or_default()
 }
 
 /// The first key at which two values differ, with both of them as text.

@@ -11,7 +11,7 @@
 //! | `height.mm` | the height of the drawn surface over its centreline | mm |
 //! | `normal.X Y Z` | the unit normal of the drawn surface: right, up, to the viewer | |
 //! | `arc.mm` | the length of the path from the root, in space | mm |
-//! | `branch.id` | the branch, as in `branches.tsv`; −1 for background and for a tree of one node | |
+//! | `branch.id` | the branch, as in `nodes.tsv` and the SVG; −1 for background and for a tree of one node | |
 //! | `node.id` | the lower node of the edge, as in `nodes.tsv`; −1 for background | |
 //! | `position.X Y Z` | the point on the centreline in the patient, RAS+ | mm |
 //! | `loss.angle` | angle loss at the upper node of the edge | degrees |

@@ -326,10 +326,13 @@ fn every_kind_of_output_comes_back() {
     let floats: Vec<f32> = (0..24_u8).map(|i| f32::from(i) / 7.0).collect();
     let expected: Vec<f64> = floats.iter().map(|&v| f64::from(v)).collect();
     assert_eq!(read_values(nifti_out::scalars(&grid, &floats).expect("fits")), expected);
+    assert_eq!(nifti_out::scalars(&grid, &floats[1..]).expect_err("too few").code(), "E-NIFTI-OUT-LENGTH");
     let labels: Vec<u32> = (0..24).map(|i| i * 100_000_000).collect();
     let expected: Vec<f64> = labels.iter().map(|&v| f64::from(v)).collect();
-    assert_eq!(read_values(nifti_out::labels(&grid, &labels).expect("fits")), expected);
-    assert_eq!(nifti_out::labels(&grid, &labels[1..]).expect_err("too few").code(), "E-NIFTI-OUT-LENGTH");
+    let [nx, ny, nz] = grid.shape();
+    let array = ndarray::Array3::from_shape_vec((nz, ny, nx), labels).expect("the grid's shape");
+    let volume = Volume::new(grid.clone(), Voxels::U32(array), 1.0, 0.0);
+    assert_eq!(read_values(nifti_out::volume(&volume).expect("fits")), expected);
 
     let long = Grid::axis_aligned([32_768, 1, 1], DVec3::ONE, DVec3::ZERO).expect("legal");
     let error = nifti_out::mask(&Mask::empty(long)).expect_err("too long");
