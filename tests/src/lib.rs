@@ -30,7 +30,7 @@ pub fn set(key: &str, value: impl Display) -> Override {
 /// A swarm small enough for tests in a debug build.
 #[must_use]
 pub fn small_swarm() -> Vec<Override> {
-    vec![set("embed.particles", 24), set("embed.iterations", 4), set("render.width_px", 400)]
+    vec![set("embed.pso.particles", 24), set("embed.pso.iterations", 4), set("render.width_px", 400)]
 }
 
 /// A run of a config or an input into a folder.

@@ -41,7 +41,8 @@ fn fixtures_are_what_the_generator_makes() {
 fn runs_give_known_bytes() {
     let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("golden/digests.tsv");
     let folder = tempfile::tempdir().expect("temporary folder");
-    let quick = [set("embed.particles", 64), set("embed.iterations", 10), set("render.width_px", 320)];
+    let quick =
+        [set("embed.pso.particles", 64), set("embed.pso.iterations", 10), set("render.width_px", 320)];
     let mut table = String::from("fixture\tsha256_of_SHA256SUMS\n");
     for fixture in ["y.nii.gz", "torus.nii.gz", "neuron.swc"] {
         let out = folder.path().join(fixture);

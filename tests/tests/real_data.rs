@@ -81,8 +81,8 @@ fn hemibrain_neuron() {
     let voxels = [
         set("input.unit", "nm"),
         set("input.scale", "[8.0, 8.0, 8.0]"),
-        set("embed.particles", 8),
-        set("embed.iterations", 1),
+        set("embed.pso.particles", 8),
+        set("embed.pso.iterations", 1),
     ];
     check("neurons/hemibrain_722817260.swc", &voxels, &Expected { tips: 300..=3000, length_mm: 0.5..=20.0 });
 }

@@ -117,7 +117,7 @@ fn later_results_go_with_what_they_were_made_from() {
 #[test]
 fn a_run_that_fails_leaves_no_mixture() {
     let (folder, config) = neuron_run(&[]);
-    let other = with(&[set("seed", 9), set("embed.memory_mib", 1), set("embed.particles", 100_000)]);
+    let other = with(&[set("seed", 9), set("embed.pso.memory_mib", 1), set("embed.pso.particles", 100_000)]);
     run(&config, folder.path(), &other, 2).expect_err("a swarm beyond its memory");
     assert!(!folder.path().join("embedding.json").exists(), "an embedding of another tree");
     let settings =

@@ -12,7 +12,7 @@ Examples:
   espalier run scan.nii.gz --set volume.method=region-grow \\
       --set volume.upper=-865 --set 'volume.seed_voxel=[58,80,85]'
   espalier run my.toml --from embed --set embed.w_angle=3    again from a stage on
-  espalier embed out/airway --set embed.freedom=s       one stage of a run folder
+  espalier embed out/airway --set embed.pso.freedom=s       one stage of a run folder
   espalier skeleton mask.nii.gz -o out/skeleton         one stage on files
   espalier phantom airway -o phantoms/airway            test data with its truth
 

@@ -116,23 +116,22 @@ fn swc_with_a_cycle() {
 
 #[test]
 fn misspelt_key() {
-    let config = "schema = 1\nname = \"x\"\n[input]\nphantom = \"neuron\"\n[embed]\nparticels = 64\n";
+    let config = "schema = 1\nname = \"x\"\n[input]\nphantom = \"neuron\"\n[embed.pso]\nparticels = 64\n";
     let folder = folder_with("typo.toml", config.as_bytes());
     refused(&folder, &["run", "typo.toml"], 2, &["typo.toml:6", "particels", "did you mean particles?"]);
     refused(
         &folder,
-        &["run", "missing.swc", "--set", "embed.particels=4"],
+        &["run", "missing.swc", "--set", "embed.pso.particels=4"],
         2,
-        &["--set embed.particels=4", "did you mean particles?"],
+        &["--set embed.pso.particels=4", "did you mean particles?"],
     );
 }
 
 #[test]
 fn value_out_of_range() {
-    let config =
-        "schema = 1\nname = \"x\"\n[input]\nphantom = \"neuron\"\n[embed]\nw_angle = 2\nparticles = 0\n";
+    let config = "schema = 1\nname = \"x\"\n[input]\nphantom = \"neuron\"\n[embed]\nw_angle = 2\n[embed.pso]\nparticles = 0\n";
     let folder = folder_with("range.toml", config.as_bytes());
-    refused(&folder, &["run", "range.toml"], 2, &["range.toml:7", "embed.particles", "is 0"]);
+    refused(&folder, &["run", "range.toml"], 2, &["range.toml:8", "embed.pso.particles", "is 0"]);
 }
 
 #[test]
@@ -182,8 +181,16 @@ fn stages_on_their_own_equal_a_run() {
     };
     run(&["phantom", "y", "-o", "y"]);
     let quick = "render.width_px=300";
-    let swarm =
-        ["--set", "embed.particles=16", "--set", "embed.iterations=4", "--set", "name=y", "--set", quick];
+    let swarm = [
+        "--set",
+        "embed.pso.particles=16",
+        "--set",
+        "embed.pso.iterations=4",
+        "--set",
+        "name=y",
+        "--set",
+        quick,
+    ];
     let with_swarm = |arguments: &[&str]| run(&[arguments, &swarm].concat());
     let first = with_swarm(&["run", "y/truth-mask.nii.gz", "-o", "whole"]);
     with_swarm(&["volume", "y/truth-mask.nii.gz", "-o", "pieces"]);
@@ -227,8 +234,14 @@ fn stages_of_a_run_folder() {
         assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
         String::from_utf8_lossy(&output.stdout).lines().last().map(str::to_owned)
     };
-    let settings =
-        ["--set", "embed.particles=16", "--set", "embed.iterations=4", "--set", "render.width_px=300"];
+    let settings = [
+        "--set",
+        "embed.pso.particles=16",
+        "--set",
+        "embed.pso.iterations=4",
+        "--set",
+        "render.width_px=300",
+    ];
     let first = run(&[["run", "n (1).swc", "-o", "deep/down/run"].as_slice(), &settings].concat());
     for stage in ["tree", "views", "embed", "render"] {
         assert_eq!(run(&[stage, "deep/down/run"]), first, "{stage} in place");

@@ -9,7 +9,7 @@
 use std::error::Error;
 use std::time::Instant;
 
-use espalier_embed::{Freedom, Params, embed};
+use espalier_embed::{Freedom, Params, PsoParams, embed};
 use espalier_model::swc::{SwcScale, parse};
 use espalier_model::{MethodRow, Node, Tree};
 use espalier_phantom::Kind;
@@ -23,15 +23,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         match word.as_str() {
             "paper" => params = Params::paper(),
             "uniform" => {
-                let Params { omega_g, omega_p, omega_target, pull, .. } = Params::paper();
-                params = Params { omega_g, omega_p, omega_target, pull, ..params };
+                let PsoParams { omega_g, omega_p, omega_target, pull, .. } = PsoParams::paper();
+                params.pso = PsoParams { omega_g, omega_p, omega_target, pull, ..params.pso };
             }
-            "s" => params.freedom = Freedom::S,
-            "b" => params.freedom = Freedom::B,
-            "n" => params.freedom = Freedom::N,
+            "s" => params.pso.freedom = Freedom::S,
+            "b" => params.pso.freedom = Freedom::B,
+            "n" => params.pso.freedom = Freedom::N,
             _ => match word.split_once('x') {
                 Some((particles, iterations)) => {
-                    (params.particles, params.iterations) = (particles.parse()?, iterations.parse()?);
+                    (params.pso.particles, params.pso.iterations) = (particles.parse()?, iterations.parse()?);
                 }
                 None => seed = word.parse()?,
             },

@@ -203,7 +203,7 @@ fn random_particle(dofs: &DofMap, stream: &mut Stream) -> Vec<f64> {
 fn swarm_energy_equals_the_one_energy() {
     for (key, freedom) in [Freedom::S, Freedom::B, Freedom::N].into_iter().cycle().take(120).enumerate() {
         let targets = if key % 2 == 0 { TargetMode::Intrinsic } else { TargetMode::Projected };
-        let params = Params { freedom, targets, w_placement: 0.3, w_length: 1.5, ..Params::default() };
+        let params = Params { targets, w_placement: 0.3, w_length: 1.5, ..Params::default() };
         let tree = random_tree(key % 8, 5 + key % 30, 1.0, false, key as u32);
         let problem = problem(&tree, &params);
         let dofs = DofMap::new(&problem, freedom);

@@ -52,8 +52,10 @@ pub enum Method {
     /// Nested cones that keep the side of every turn.
     Cone,
     /// The paper's particle swarm.
-    #[default]
     Pso,
+    /// Ours: mirror search, untangling, coordinate descent and a barrier method in turn.
+    #[default]
+    Solver,
 }
 
 impl Method {
@@ -65,7 +67,14 @@ impl Method {
             Self::Radial => "radial",
             Self::Cone => "cone",
             Self::Pso => "pso",
+            Self::Solver => "solver",
         }
+    }
+
+    /// Whether the method searches for the least energy.
+    #[must_use]
+    pub fn is_optimiser(self) -> bool {
+        matches!(self, Self::Pso | Self::Solver)
     }
 }
 

@@ -33,12 +33,15 @@ mod layout;
 mod losses;
 mod overlap;
 mod params;
+mod paths;
 mod place;
 mod pose;
 mod problem;
 mod ratio;
 mod select;
+mod separation;
 mod siblings;
+mod solver;
 mod targets;
 
 use espalier_model::{Embedding, Report, Tree, ViewHierarchy};
@@ -46,7 +49,7 @@ use espalier_model::{Embedding, Report, Tree, ViewHierarchy};
 pub use certify::certify;
 pub use choices::{CrossingWeight, Freedom, Method, PoseMode, Pull, Start, TargetMode};
 pub use error::Error;
-pub use params::Params;
+pub use params::{Params, PsoParams, SolverParams};
 
 /// How far the swarm is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,7 +86,7 @@ pub struct Embedded {
 /// beyond its memory, or [`Error::Uncertified`] where no layout is free of crossings after rounding.
 ///
 /// ```
-/// use espalier_embed::{Params, embed};
+/// use espalier_embed::{Params, PsoParams, embed};
 /// use espalier_model::{Node, Tree};
 /// use espalier_views::find_views;
 /// use glam::DVec3;
@@ -101,9 +104,9 @@ pub struct Embedded {
 /// assert!(embedding.certificate.holds());
 /// assert!(embedding.losses.angle3d_error_max_deg < 1e-6);
 ///
-/// let alone = Params { particles: 1, ..Params::default() };
+/// let alone = Params { pso: PsoParams { particles: 1, ..PsoParams::default() }, ..Params::default() };
 /// let error = embed(&tree, &views, &alone, 0, &|_| {}).unwrap_err();
-/// assert_eq!(error.to_string(), "embed: particles: must be from 3 to 1000000, is 1");
+/// assert_eq!(error.to_string(), "embed: pso.particles: must be from 3 to 1000000, is 1");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn embed(

@@ -17,6 +17,7 @@ use espalier_geom::math;
 use espalier_geom::plane::{Segment, segment_distance};
 use glam::DVec2;
 
+use crate::paths::Ancestors;
 use crate::problem::Problem;
 
 /// The most pairs that are looked at: a tree whose radii are in another unit than its positions has billions.
@@ -134,63 +135,5 @@ impl<'a> Tubes<'a> {
             r_a + r_b
         };
         disc.min(self.branch_length(arm_a)).min(self.branch_length(arm_b))
-    }
-}
-
-/// Lowest common ancestors in constant time: the lowest parent over a range of the preorder.
-struct Ancestors {
-    /// `levels[k][v]` = the least parent among nodes v .. v + 2^k.
-    levels: Vec<Vec<u32>>,
-}
-
-impl Ancestors {
-    fn new(parent: &[u32]) -> Self {
-        let mut levels = vec![parent.to_vec()];
-        let mut width = 1;
-        while 2 * width <= parent.len() {
-            let last = &levels[levels.len() - 1];
-            let next = (0..=parent.len() - 2 * width).map(|v| last[v].min(last[v + width])).collect();
-            levels.push(next);
-            width *= 2;
-        }
-        Self { levels }
-    }
-
-    /// In preorder the ancestor is the least parent among the nodes after the first up to the second.
-    fn lowest_common(&self, a: usize, b: usize) -> usize {
-        let (first, last) = (a.min(b), a.max(b));
-        if first == last {
-            return first;
-        }
-        let level = (last - first).ilog2() as usize;
-        let row = &self.levels[level];
-        row[first + 1].min(row[last + 1 - (1 << level)]) as usize
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ancestors_equal_climbing() {
-        // 0 ─ 1 ─ 2, 1 ─ 3 ─ {4, 5 ─ 6}, 0 ─ 7 ─ 8
-        let parent = [0, 0, 1, 1, 3, 3, 5, 0, 7];
-        let ancestors = Ancestors::new(&parent);
-        let chain = |mut node: usize| {
-            let mut chain = vec![node];
-            while node != 0 {
-                node = parent[node] as usize;
-                chain.push(node);
-            }
-            chain
-        };
-        for a in 0..parent.len() {
-            for b in 0..parent.len() {
-                let above = chain(a);
-                let expected = chain(b).into_iter().find(|node| above.contains(node));
-                assert_eq!(Some(ancestors.lowest_common(a, b)), expected, "{a} {b}");
-            }
-        }
     }
 }

@@ -2,9 +2,9 @@
 //!
 //! **Input** the problem, params, seed. **Output** `Embedded`.
 //! **Steps** 1. Run the methods. 2. Each layout gets its pose and is rounded. 3. Exact certificate, energy, losses.
-//! 4. The winner: for `pso` the certified layout of least energy, whoever made it; of equal ones, its own. For a
+//! 4. The winner: for an optimiser the certified layout of least energy, whoever made it; of equal ones, its own. For a
 //! constructive method that method, or if it has crossings the certified layout of least energy.
-//! **Guarantees** the result is certified, and under `pso` never worse than any certified layout that ran. Every
+//! **Guarantees** the result is certified, and under an optimiser never worse than any certified layout that ran. Every
 //! layout is scored from its coordinates as written, in the handedness of the targets (see `pose`).
 //! **Cost** dominated by the swarm.
 
@@ -21,7 +21,7 @@ use crate::layout::{Layout, cone, projection, pso, radial};
 use crate::params::Params;
 use crate::pose::{self, Posed};
 use crate::problem::Problem;
-use crate::{Embedded, Progress, certify, losses, overlap, place};
+use crate::{Embedded, Progress, certify, losses, overlap, place, solver};
 
 /// Every layout that the params ask for, by method, each method once, in a fixed order.
 pub(crate) fn run_methods(
@@ -40,14 +40,16 @@ pub(crate) fn run_methods(
     // Radial and cone cost next to nothing, and one of them is the way out when the method asked for crosses.
     let (radial, cone) = (radial::headings(problem), cone::headings(problem));
     let swarm = if wants(Method::Pso) {
-        Some(pso::layout(problem, (&radial, &cone), (params, seed), progress)?)
+        Some(pso::layout(problem, (&radial, &cone), (&params.pso, seed), progress)?)
     } else {
         None
     };
+    let solved = wants(Method::Solver).then(|| solver::layout(problem, &cone, params));
     let (radial, cone) = (place::from_headings(problem, &radial), place::from_headings(problem, &cone));
     layouts.push((Method::Radial, Layout::constructed("radial", radial)));
     layouts.push((Method::Cone, Layout::constructed("cone", cone)));
     layouts.extend(swarm.map(|layout| (Method::Pso, layout)));
+    layouts.extend(solved.map(|layout| (Method::Solver, layout)));
     Ok(layouts)
 }
 
@@ -105,7 +107,7 @@ pub(crate) fn select(
     let Judged { name, posed, certificate, scored, losses, method, .. } = judged.swap_remove(winner_idx);
     let termination = if scored.energy.length + scored.energy.angle == 0.0 {
         Termination::Optimal
-    } else if params.method == Method::Pso || method == Method::Pso {
+    } else if params.method.is_optimiser() || method.is_optimiser() {
         Termination::BudgetSpent
     } else {
         Termination::Constructed
@@ -138,7 +140,7 @@ fn winner(judged: &[Judged], asked: Method) -> Result<usize, Error> {
     let as_asked = certified.clone().find(|&idx| judged[idx].method == asked);
     let is_equal = |a: f64, b: f64| (a - b).abs() <= EQUAL * a.max(b).max(1.0);
     if let (Some(own), Some(best)) = (as_asked, best)
-        && (asked != Method::Pso || is_equal(energy(own), energy(best)))
+        && (!asked.is_optimiser() || is_equal(energy(own), energy(best)))
     {
         return Ok(own);
     }

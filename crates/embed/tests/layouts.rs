@@ -6,15 +6,19 @@ mod common;
 
 use common::{random_tree, tree_of, views_along};
 use espalier_embed::{
-    CrossingWeight, Embedded, Error, Freedom, Method, Params, PoseMode, Pull, Start, TargetMode, certify,
-    embed,
+    CrossingWeight, Embedded, Error, Freedom, Method, Params, PoseMode, PsoParams, Pull, Start, TargetMode,
+    certify, embed,
 };
 use espalier_model::diagnose::{Class, Diagnose};
 use espalier_model::{Embedding, MethodRow, Termination, Tree};
 use glam::{DVec2, DVec3};
 
+fn with_pso(pso: PsoParams) -> Params {
+    Params { pso, ..Params::default() }
+}
+
 fn small() -> Params {
-    Params { particles: 24, iterations: 8, ..Params::default() }
+    with_pso(PsoParams { particles: 24, iterations: 8, ..PsoParams::default() })
 }
 
 fn laid_flat(tree: &Tree, params: &Params) -> Embedded {
@@ -32,7 +36,7 @@ fn the_result_is_certified_and_never_worse() {
             2 => (Freedom::N, Pull::Uniform, Start::Relaxed),
             _ => (Freedom::N, Pull::Subtree, Start::Relaxed),
         };
-        let params = Params { freedom, pull, start, ..small() };
+        let params = with_pso(PsoParams { freedom, pull, start, ..small().pso });
         let embedding = laid_flat(&tree, &params).embedding;
         assert!(embedding.certificate.holds());
         let energy = embedding.energy.total();
@@ -114,7 +118,10 @@ fn same_bytes_for_any_number_of_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().expect("a pool");
         pool.install(|| laid_flat(&tree, params).embedding.to_json())
     };
-    for params in [small(), Params { particles: 60, iterations: 5, ..Params::paper() }] {
+    for params in [
+        small(),
+        Params { pso: PsoParams { particles: 60, iterations: 5, ..PsoParams::paper() }, ..Params::paper() },
+    ] {
         let one = with_threads(1, &params);
         assert_eq!(one, with_threads(2, &params));
         assert_eq!(one, with_threads(3, &params));
@@ -258,17 +265,17 @@ fn bad_input_is_named() {
     let views = views_along(&tree, DVec3::Z);
     let error_of = |params: Params| embed(&tree, &views, &params, 0, &|_| {}).expect_err("a bad parameter");
     for (params, key) in [
-        (Params { particles: 2, ..small() }, "particles"),
+        (with_pso(PsoParams { particles: 2, ..small().pso }), "pso.particles"),
         (Params { w_angle: f64::NAN, ..small() }, "w_angle"),
-        (Params { omega_g: -0.1, ..small() }, "omega_g"),
+        (with_pso(PsoParams { omega_g: -0.1, ..small().pso }), "pso.omega_g"),
         (Params { w_crossing: CrossingWeight::Fixed(0.0), ..small() }, "w_crossing"),
-        (Params { memory_mib: 0, ..small() }, "memory_mib"),
+        (with_pso(PsoParams { memory_mib: 0, ..small().pso }), "pso.memory_mib"),
     ] {
         let error = error_of(params);
         assert_eq!(error.class(), Class::Usage);
         assert!(matches!(&error, Error::Param(param) if param.key == key), "{error}");
     }
-    let huge = Params { particles: 1_000_000, memory_mib: 64, ..small() };
+    let huge = with_pso(PsoParams { particles: 1_000_000, memory_mib: 64, ..small().pso });
     assert_eq!(error_of(huge).class(), Class::Limit);
 
     // Lengths over sixteen decades: the shortest vanish in twelve digits.

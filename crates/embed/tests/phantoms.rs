@@ -1,7 +1,7 @@
 //! The swarm on phantom trees with the views that the pipeline would find.
 #![allow(clippy::expect_used, reason = "a test that cannot go on says why")]
 
-use espalier_embed::{Embedded, Params, embed};
+use espalier_embed::{Embedded, Params, PsoParams, embed};
 use espalier_model::Tree;
 use espalier_phantom::{Kind, grow_tree};
 use espalier_views::find_views;
@@ -33,7 +33,8 @@ fn the_default_swarm_is_far_better_than_its_starts() {
 #[test]
 fn the_papers_swarm_ends_without_crossings_and_never_worse() {
     let tree = grow_tree(Kind::Neuron, &espalier_phantom::Params::default(), 2).expect("a phantom");
-    let params = Params { particles: 400, iterations: 12, ..Params::paper() };
+    let params =
+        Params { pso: PsoParams { particles: 400, iterations: 12, ..PsoParams::paper() }, ..Params::paper() };
     let embedded = laid_flat(&tree, &params);
     assert!(embedded.embedding.certificate.holds());
     assert!(embedded.embedding.energy.total() <= constructed_energy(&embedded));

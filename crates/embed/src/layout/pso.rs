@@ -22,7 +22,7 @@ use crate::error::Error;
 use crate::layout::Layout;
 use crate::layout::start::{self, Incumbents};
 use crate::layout::step::Rule;
-use crate::params::Params;
+use crate::params::PsoParams;
 use crate::place;
 use crate::problem::Problem;
 
@@ -30,7 +30,7 @@ use crate::problem::Problem;
 pub(crate) fn layout(
     problem: &Problem,
     (radial, cone): (&[f64], &[f64]),
-    (params, seed): (&Params, u64),
+    (params, seed): (&PsoParams, u64),
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Layout, Error> {
     let dofs = DofMap::new(problem, params.freedom);
@@ -78,7 +78,7 @@ fn targets_met(
     energy: &CpuEnergy,
     name: String,
     targets: &[f64],
-    params: &Params,
+    params: &PsoParams,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Layout {
     let score = energy.evaluate_one(targets, f64::INFINITY, &mut Scratch::default());
@@ -92,11 +92,11 @@ fn targets_met(
     Layout { name, positions: energy.positions(targets), evaluations: 1, trace: vec![point] }
 }
 
-fn name(params: &Params) -> String {
+fn name(params: &PsoParams) -> String {
     format!("pso {}x{} {}", params.particles, params.iterations, params.freedom.name())
 }
 
-fn check_memory(params: &Params, dims: usize) -> Result<(), Error> {
+fn check_memory(params: &PsoParams, dims: usize) -> Result<(), Error> {
     let needed_mib = u64::from(params.particles) * dims as u64 * 24 / (1 << 20);
     if needed_mib > params.memory_mib {
         let (particles, limit_mib) = (params.particles, params.memory_mib);
@@ -183,7 +183,7 @@ impl Swarm {
         );
     }
 
-    fn record(&mut self, iteration: u32, params: &Params, progress: &(dyn Fn(Progress) + Sync)) {
+    fn record(&mut self, iteration: u32, params: &PsoParams, progress: &(dyn Fn(Progress) + Sync)) {
         let Score { energy, crossings } = self.global_score;
         let point = TracePoint { iteration, evaluations: self.evaluations, energy, crossings };
         report(&point, params, progress);
@@ -191,7 +191,7 @@ impl Swarm {
     }
 }
 
-fn report(point: &TracePoint, params: &Params, progress: &(dyn Fn(Progress) + Sync)) {
+fn report(point: &TracePoint, params: &PsoParams, progress: &(dyn Fn(Progress) + Sync)) {
     progress(Progress {
         done: u64::from(point.iteration),
         total: u64::from(params.iterations),

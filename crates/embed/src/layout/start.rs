@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use crate::batch::{CpuEnergy, DofMap, Scratch};
 use crate::choices::Start;
-use crate::params::Params;
+use crate::params::PsoParams;
 use crate::problem::Problem;
 
 /// Relaxing may take the swarm's evaluations divided by this.
@@ -44,14 +44,14 @@ pub(crate) struct Swarm {
 }
 
 /// The swarm's start.
-pub(crate) fn start(energy: &CpuEnergy, incumbents: &Incumbents, params: &Params, seed: u64) -> Swarm {
+pub(crate) fn start(energy: &CpuEnergy, incumbents: &Incumbents, params: &PsoParams, seed: u64) -> Swarm {
     match params.start {
         Start::Paper => paper(energy.dofs, incumbents, params, seed),
         Start::Relaxed => relaxed(energy, incumbents, params, seed),
     }
 }
 
-fn paper(dofs: &DofMap, incumbents: &Incumbents, params: &Params, seed: u64) -> Swarm {
+fn paper(dofs: &DofMap, incumbents: &Incumbents, params: &PsoParams, seed: u64) -> Swarm {
     let dims = dofs.dims();
     let mut ratios = vec![0.0; params.particles as usize * dims];
     let mut velocities = vec![0.0; ratios.len()];
@@ -70,7 +70,7 @@ fn paper(dofs: &DofMap, incumbents: &Incumbents, params: &Params, seed: u64) -> 
     Swarm { ratios, velocities, evaluations: 0 }
 }
 
-fn relaxed(energy: &CpuEnergy, incumbents: &Incumbents, params: &Params, seed: u64) -> Swarm {
+fn relaxed(energy: &CpuEnergy, incumbents: &Incumbents, params: &PsoParams, seed: u64) -> Swarm {
     let dims = energy.dofs.dims();
     let stream = |particle: usize| Stream::new(seed, Purpose::SwarmStart, particle as u32, 0);
     let mut ratios = vec![0.0; params.particles as usize * dims];
@@ -96,7 +96,7 @@ fn relaxed(energy: &CpuEnergy, incumbents: &Incumbents, params: &Params, seed: u
 }
 
 /// How many particles relax, and how many evaluations each may take.
-fn relaxing_work(problem: &Problem, params: &Params) -> (usize, u64) {
+fn relaxing_work(problem: &Problem, params: &PsoParams) -> (usize, u64) {
     let total = u64::from(params.particles) * u64::from(params.iterations) / RELAXING_SHARE;
     let enough = SWEEPS * problem.branches.list().len() as u64;
     let n_relaxed = (total / enough.max(1)).clamp(2, 16).min(u64::from(params.particles) - 3);

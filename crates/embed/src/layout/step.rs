@@ -18,14 +18,14 @@ use espalier_geom::random::Stream;
 use crate::batch::DofMap;
 use crate::choices::Pull;
 use crate::layout::start::segments_below;
-use crate::params::Params;
+use crate::params::PsoParams;
 use crate::problem::Problem;
 
 /// How a particle moves.
 pub(crate) struct Rule<'a> {
     pub(crate) problem: &'a Problem<'a>,
     pub(crate) dofs: &'a DofMap,
-    pub(crate) params: &'a Params,
+    pub(crate) params: &'a PsoParams,
 }
 
 impl Rule<'_> {
@@ -39,7 +39,7 @@ impl Rule<'_> {
 
     /// Eq. 5 as printed.
     fn everywhere(&self, p: &mut [f64], u: &[f64], (own, global): (&[f64], &[f64]), stream: &mut Stream) {
-        let Params { omega_g, omega_p, omega_inertia, .. } = *self.params;
+        let PsoParams { omega_g, omega_p, omega_inertia, .. } = *self.params;
         for dim in 0..p.len() {
             let gamma = stream.uniform(-1.0, 1.0);
             let (low, high) = self.dofs.range(dim);
@@ -53,7 +53,7 @@ impl Rule<'_> {
 
     /// Eq. 5 one part of the tree at a time, and the pull to the targets.
     fn in_subtrees(&self, p: &mut [f64], u: &[f64], (own, global): (&[f64], &[f64]), stream: &mut Stream) {
-        let Params { omega_g, omega_p, omega_inertia, omega_target, .. } = *self.params;
+        let PsoParams { omega_g, omega_p, omega_inertia, omega_target, .. } = *self.params;
         for dim in 0..p.len() {
             self.pull(p, own, dim, omega_p);
         }
@@ -117,6 +117,7 @@ mod tests {
     use super::*;
     use crate::choices::Freedom;
     use crate::common::{random_tree, stream, views_along};
+    use crate::params::Params;
     use crate::targets;
 
     /// The largest pulls that params allow, from particles at the ends of their ranges.
@@ -124,13 +125,15 @@ mod tests {
     fn ratios_stay_in_their_ranges() {
         for (key, pull) in [Pull::Subtree, Pull::Uniform].into_iter().cycle().take(16).enumerate() {
             let tree = random_tree(key % 8, 60, 1.0, false, key as u32);
-            let params = Params { pull, omega_g: 2.0, omega_p: 2.0, omega_inertia: 2.0, ..Params::default() };
+            let params = Params::default();
+            let pso =
+                PsoParams { pull, omega_g: 2.0, omega_p: 2.0, omega_inertia: 2.0, ..PsoParams::default() };
             let branches = tree.branches();
             let views = views_along(&tree, glam::DVec3::Z);
             let targets = targets::targets(&tree, &branches, &views, params.targets).expect("targets");
             let problem = Problem::new(&tree, branches, targets, &params);
             let dofs = DofMap::new(&problem, [Freedom::S, Freedom::B, Freedom::N][key % 3]);
-            let rule = Rule { problem: &problem, dofs: &dofs, params: &params };
+            let rule = Rule { problem: &problem, dofs: &dofs, params: &pso };
             let mut stream = stream(5000 + key as u32);
             let mut at_an_end = || -> Vec<f64> {
                 let end = |dim| if stream.unit() < 0.5 { dofs.range(dim).0 } else { dofs.range(dim).1 };

@@ -35,7 +35,7 @@ impl SourceText<'_> {
             let rendered = format!("--set {key}={value}: {}", error.message);
             return Box::new(ConfigError { rendered, hint: String::new() });
         }
-        self.at(self.find(table, error.key), &title, String::new())
+        self.at(self.find(&dotted), &title, String::new())
     }
 
     /// The config under overrides.
@@ -66,20 +66,23 @@ impl SourceText<'_> {
         Box::new(ConfigError { rendered: format!("{path}:{line}: {title}\n{picture}"), hint })
     }
 
-    /// Where `key` of `table` stands; where the table stands if the key is not there.
-    fn find(&self, table: &str, key: &str) -> Option<Range<usize>> {
+    /// Where a dotted key stands; where the innermost table on the way stands if the key is not there.
+    fn find(&self, dotted: &str) -> Option<Range<usize>> {
         let root = DeTable::parse(self.text).ok()?;
-        let root = root.get_ref();
-        let (inner, fallback) = if table.is_empty() {
-            (root, None)
-        } else {
-            let (name, value) = entry(root, table)?;
-            match value.get_ref() {
-                DeValue::Table(inner) => (inner, Some(name)),
-                _ => return Some(name),
+        let mut table = root.get_ref();
+        let mut place = None;
+        let mut names = dotted.split('.').peekable();
+        while let Some((name, value)) = names.next().and_then(|name| entry(table, name)) {
+            if names.peek().is_none() {
+                return Some(name.start..value.span().end);
             }
-        };
-        entry(inner, key).map(|(name, value)| name.start..value.span().end).or(fallback)
+            place = Some(name);
+            match value.get_ref() {
+                DeValue::Table(inner) => table = inner,
+                _ => break,
+            }
+        }
+        place
     }
 }
 

@@ -1,0 +1,104 @@
+//! The parameters of the stage: `[embed]` in the config.
+
+mod pso;
+mod solver;
+
+use espalier_model::diagnose::ParamError;
+use serde::{Deserialize, Serialize};
+
+pub use pso::PsoParams;
+pub use solver::SolverParams;
+
+use crate::choices::{CrossingWeight, Method, PoseMode, TargetMode};
+
+/// How a tree is laid flat.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Params {
+    /// Where target angles come from. Default `intrinsic`: the exact angles can always be drawn, so nothing is
+    /// lost before the layout begins. `projected` is the paper's.
+    pub targets: TargetMode,
+    /// The method whose layout is used. The optimisers, `solver` and `pso`, give way to any other layout that ran,
+    /// is free of crossings and has a lower energy (by more than rounding); the others give way only if they have
+    /// crossings. Default `solver`.
+    pub method: Method,
+    /// The methods that are run and compared, each one row of `compare.tsv`. `radial` and `cone` always run, here
+    /// or not, for they cost next to nothing and one of them is the way out where `method` crosses; so does
+    /// `method` itself. Default all.
+    pub methods: Vec<Method>,
+    /// How the whole is turned in the end; no energy or loss depends on it. Default `auto`: `view` for a
+    /// scan, which keeps cranial up and the patient's right on the viewer's left; `root-on-top` for a traced tree,
+    /// which has no such sides.
+    pub pose: PoseMode,
+    /// Weight w_l of the length ratios in the energy, ≥ 0. Default 2, the paper's. Larger keeps lengths and
+    /// bends more.
+    pub w_length: f64,
+    /// Weight w_a of the angle ratios, ≥ 0. Default 2, the paper's. Larger keeps angles and stretches more.
+    pub w_angle: f64,
+    /// Weight w_g of the relative placement, ≥ 0: how much an edge should point as it does in the global view.
+    /// Default 0.01, small enough to decide only between layouts of like angles; the paper has none (0).
+    pub w_placement: f64,
+    /// Price of one crossing: `"auto"` or a number > 0. Default `"auto"`, section 3.2.2 of the paper: 1.5 times
+    /// the largest possible loss, so that one crossing costs more than any layout without. The 0.2 of section 5
+    /// can leave crossings to the swarm; such a result is never used.
+    pub w_crossing: CrossingWeight,
+    /// `[embed.solver]`: our optimiser.
+    pub solver: SolverParams,
+    /// `[embed.pso]`: the paper's particle swarm.
+    pub pso: PsoParams,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            targets: TargetMode::Intrinsic,
+            method: Method::Solver,
+            methods: vec![Method::Projection, Method::Radial, Method::Cone, Method::Pso, Method::Solver],
+            pose: PoseMode::Auto,
+            w_length: 2.0,
+            w_angle: 2.0,
+            w_placement: 0.01,
+            w_crossing: CrossingWeight::Auto,
+            solver: SolverParams::default(),
+            pso: PsoParams::default(),
+        }
+    }
+}
+
+impl Params {
+    /// The published values: sections 3.2.2 and 5 of [Hu2022]. The price of a crossing is that of section 3.2.2,
+    /// because the 0.2 of section 5 can leave crossings.
+    #[must_use]
+    pub fn paper() -> Self {
+        Self {
+            targets: TargetMode::Projected,
+            w_placement: 0.0,
+            method: Method::Pso,
+            pso: PsoParams::paper(),
+            ..Self::default()
+        }
+    }
+
+    /// Checks every range.
+    ///
+    /// # Errors
+    /// The first parameter outside its range.
+    pub fn validate(&self) -> Result<(), ParamError> {
+        let weights =
+            [("w_length", self.w_length), ("w_angle", self.w_angle), ("w_placement", self.w_placement)];
+        for (key, weight) in weights {
+            let is_legal = (0.0..=1e6).contains(&weight);
+            ParamError::check(key, is_legal, format!("must be from 0 to 1e6, is {weight}"))?;
+        }
+        if let CrossingWeight::Fixed(weight) = self.w_crossing {
+            let is_legal = weight > 0.0 && weight <= 1e12;
+            ParamError::check(
+                "w_crossing",
+                is_legal,
+                format!("must be \"auto\" or in (0, 1e12], is {weight}"),
+            )?;
+        }
+        self.solver.validate()?;
+        self.pso.validate()
+    }
+}

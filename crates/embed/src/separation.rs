@@ -1,0 +1,90 @@
+//! How far apart edges must stay, and whether they do.
+//!
+//! **Input** two edges by their lower nodes, positions. **Output** whether they meet, or come too near.
+//! **Notation** gap = the path along the tree between the near ends of two edges.
+//! **Definition** edges that are not neighbours *meet* nearer than 1e-6 of the median edge length; they are *too
+//! near* nearer than the clearance, or than a fifth of their gap if that is less. Neighbours meet within 1e-6 rad.
+//! **Guarantees** what does not meet here has no crossing after rounding, in the exact check.
+//! **Cost** O(1) for a pair.
+
+use espalier_geom::plane::{Segment, segment_distance};
+use glam::DVec2;
+
+use crate::paths::Paths;
+use crate::problem::Problem;
+
+/// The tolerance as a share of the median edge length, and the least angle between neighbours in rad.
+const TOLERANCE: f64 = 1e-6;
+/// The clearance is at most this share of the path between two edges: near a fork edges have to be near.
+const GAP_SHARE: f64 = 0.2;
+
+/// The rule of separation of a problem.
+pub(crate) struct Separation {
+    pub(crate) paths: Paths,
+    /// Edges that are not neighbours keep at least this far apart, where their gap allows, in mm.
+    pub(crate) clearance_mm: f64,
+    tolerance_mm: f64,
+}
+
+impl Separation {
+    /// With a clearance given as a share of the median edge length.
+    pub(crate) fn new(problem: &Problem, clearance: f64) -> Self {
+        Self {
+            paths: Paths::new(&problem.parent, &problem.targets.length_mm),
+            clearance_mm: clearance * problem.scale_mm,
+            tolerance_mm: TOLERANCE * problem.scale_mm,
+        }
+    }
+
+    /// The distance below which two edges meet, in mm, if they are not neighbours.
+    pub(crate) fn tolerance_mm(&self) -> f64 {
+        self.tolerance_mm
+    }
+
+    /// The distance that two edges have to keep, in mm; 0 for neighbours.
+    pub(crate) fn required_mm(&self, a: usize, b: usize) -> f64 {
+        let gap_mm = self.paths.gap_mm(a, b);
+        if gap_mm == 0.0 { 0.0 } else { self.clearance_mm.min(GAP_SHARE * gap_mm).max(self.tolerance_mm) }
+    }
+
+    /// Whether two different edges meet.
+    pub(crate) fn meet(&self, problem: &Problem, positions: &[DVec2], a: usize, b: usize) -> bool {
+        if let Some(is_folded) = neighbours_fold(problem, positions, a, b) {
+            return is_folded;
+        }
+        let (s, t) = (segment(problem, positions, a), segment(problem, positions, b));
+        segment_distance(&s, &t) < self.tolerance_mm
+    }
+
+    /// Whether two different edges meet or are too near.
+    pub(crate) fn too_near(&self, problem: &Problem, positions: &[DVec2], a: usize, b: usize) -> bool {
+        if let Some(is_folded) = neighbours_fold(problem, positions, a, b) {
+            return is_folded;
+        }
+        let (s, t) = (segment(problem, positions, a), segment(problem, positions, b));
+        segment_distance(&s, &t) < self.required_mm(a, b)
+    }
+}
+
+/// An edge by its lower node.
+pub(crate) fn segment(problem: &Problem, positions: &[DVec2], edge: usize) -> Segment {
+    Segment { a: positions[problem.parent[edge] as usize], b: positions[edge] }
+}
+
+/// For edges with a common node: whether they lie on each other.
+fn neighbours_fold(problem: &Problem, positions: &[DVec2], a: usize, b: usize) -> Option<bool> {
+    let (first, last) = (a.min(b), a.max(b));
+    let (parent_first, parent_last) = (problem.parent[first] as usize, problem.parent[last] as usize);
+    let (hub, other) = if parent_last == first {
+        (first, parent_first)
+    } else if parent_last == parent_first {
+        (parent_first, first)
+    } else {
+        return None;
+    };
+    let (to_other, to_last) = (positions[other] - positions[hub], positions[last] - positions[hub]);
+    let is_ahead = to_other.dot(to_last) > 0.0;
+    // sin of the angle between them; the lengths are positive unless the edges have none.
+    let across = to_other.perp_dot(to_last).abs();
+    Some(is_ahead && across <= TOLERANCE * to_other.length() * to_last.length() || to_last == DVec2::ZERO)
+}
