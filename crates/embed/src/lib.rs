@@ -34,6 +34,7 @@ mod losses;
 mod overlap;
 mod params;
 mod paths;
+mod pins;
 mod place;
 mod pose;
 mod problem;

@@ -18,6 +18,7 @@ use crate::params::Params;
 use crate::ratio;
 
 /// A tree with targets and weights.
+#[derive(Clone)]
 pub(crate) struct Problem<'a> {
     /// The tree.
     pub(crate) tree: &'a Tree,
@@ -33,6 +34,11 @@ pub(crate) struct Problem<'a> {
     pub(crate) bend: Vec<f64>,
     /// −1 where the target turns right, 1 where left.
     pub(crate) side: Vec<f64>,
+    /// Whether the angle ratio of each node may be chosen. Not that of the root, which has none, nor one that a
+    /// manual edit has pinned: there the target is the pinned turn, at no cost, and the ratio stays 0.
+    pub(crate) free_angle: Vec<bool>,
+    /// Whether the length ratio of each segment may be chosen. A pinned one stays 0, as above.
+    pub(crate) free_length: Vec<bool>,
     /// What r_l² costs: w_l over the number of edges of the branch.
     pub(crate) length_cost: Vec<f64>,
     /// What r_a² costs: w_a over the number of angles of the branch; 0 for children of the root.
@@ -90,6 +96,8 @@ impl<'a> Problem<'a> {
         let bend = targets.angle_rad.iter().map(|&angle| zero_if_nan(ratio::target_bend(angle))).collect();
         let side = targets.angle_rad.iter().map(|&angle| ratio::side_sign(angle)).collect();
         let scale_mm = median_length(&targets.length_mm[1..]);
+        let free_angle = (0..n_nodes).map(|node| node > 0).collect();
+        let free_length = vec![true; branches.list().len()];
         Self {
             tree,
             branches,
@@ -98,6 +106,8 @@ impl<'a> Problem<'a> {
             branch,
             bend,
             side,
+            free_angle,
+            free_length,
             length_cost,
             angle_cost,
             placement_cost,

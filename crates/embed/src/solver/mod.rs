@@ -16,7 +16,7 @@ mod work;
 use crate::layout::Layout;
 use crate::params::Params;
 use crate::problem::Problem;
-use shape::Shape;
+pub(crate) use shape::Shape;
 
 /// Lays the problem's tree flat; `cone` are the headings of the cone start.
 pub(crate) fn layout(problem: &Problem, cone: &[f64], _params: &Params) -> Layout {
