@@ -26,6 +26,8 @@ pub enum Purpose {
     SwarmStart = 4,
     /// Steps of an embedding swarm.
     SwarmStep = 5,
+    /// The search for the sides of turns.
+    MirrorSearch = 6,
     /// Tests.
     Test = 99,
 }

@@ -12,6 +12,31 @@ pub enum TargetKind {
     Intrinsic,
     /// The paper's: the angle measured in the local plane.
     Projected,
+    /// As `Intrinsic`, with sides that were searched so that fewer branches cross: a local plane and its mirror
+    /// image are equally good views.
+    IntrinsicMirrored,
+    /// As `Projected`, with sides that were searched.
+    ProjectedMirrored,
+}
+
+impl TargetKind {
+    /// The same with sides that were searched.
+    #[must_use]
+    pub fn mirrored(self) -> Self {
+        match self {
+            Self::Intrinsic | Self::IntrinsicMirrored => Self::IntrinsicMirrored,
+            Self::Projected | Self::ProjectedMirrored => Self::ProjectedMirrored,
+        }
+    }
+
+    /// The same with the sides of the local planes.
+    #[must_use]
+    pub fn unmirrored(self) -> Self {
+        match self {
+            Self::Intrinsic | Self::IntrinsicMirrored => Self::Intrinsic,
+            Self::Projected | Self::ProjectedMirrored => Self::Projected,
+        }
+    }
 }
 
 /// What an embedding aims at, by node; frozen before any method runs, and in the handedness of the global view: in

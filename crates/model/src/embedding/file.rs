@@ -23,6 +23,8 @@ impl TargetKind {
         match self {
             Self::Intrinsic => "intrinsic",
             Self::Projected => "projected",
+            Self::IntrinsicMirrored => "intrinsic-mirrored",
+            Self::ProjectedMirrored => "projected-mirrored",
         }
     }
 }
@@ -184,6 +186,8 @@ struct EmbeddingFile {
 enum TargetKindFile {
     Intrinsic,
     Projected,
+    IntrinsicMirrored,
+    ProjectedMirrored,
 }
 
 #[derive(Clone, Copy, Serialize, Deserialize)]
@@ -466,7 +470,7 @@ same_fields!(
         spearman,
     }
 );
-same_variants!(TargetKind, TargetKindFile { Intrinsic, Projected });
+same_variants!(TargetKind, TargetKindFile { Intrinsic, Projected, IntrinsicMirrored, ProjectedMirrored });
 same_variants!(Termination, TerminationFile { Constructed, Optimal, BudgetSpent });
 
 #[cfg(test)]
