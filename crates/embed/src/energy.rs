@@ -4,11 +4,13 @@
 //! **Notation** l target length, l_e embedded length, h heading, H heading in the global view, p cost of a node's
 //! placement. **Steps** 1. r_l = l_e / l − 1 and r_a by the inverse of equation 3. 2. Σ over segments of
 //! w_l · mean r_l² + w_a · mean r_a² (Eq. 4, equal to the printed one where a segment has one ratio).
-//! 3. Placement: Σ p wrap(h + φ − H)², φ the rotation for which Σ p cos(h + φ − H) is largest.
+//! Beside it w_s · mean of how far a turn is on the other side of its target. 3. Placement: Σ p wrap(h + φ − H)², φ the rotation for which Σ p cos(h + φ − H) is largest.
 //! **Guarantees** a deviation that rounding to the quantum explains counts as none, so that a layout that meets
 //! all targets has energy 0 after rounding too. No loss for the angles of the root's children.
-//! **Source** [Hu2022] Eq. 4. **Differs from the source** the placement term is ours.
+//! **Source** [Hu2022] Eq. 4. **Differs from the source** the side and placement terms are ours.
 //! **Cost** O(N).
+
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use espalier_geom::angle::wrap;
 use espalier_geom::math;
@@ -54,10 +56,23 @@ pub(crate) fn score(problem: &Problem, positions: &[DVec2], quantum_mm: f64, cro
                 angle_ratio[node] = ratio::angle_ratio(problem.targets.angle_rad[node], turn_rad[node]);
             }
             energy.angle += problem.angle_cost[node] * angle_ratio[node] * angle_ratio[node];
+            if !is_explained {
+                energy.side += problem.side_cost[node] * switched(target_turn, turn_rad[node]);
+            }
         }
     }
     energy.placement = placement(problem, &heading_rad);
     Scored { energy, length_ratio, angle_ratio }
+}
+
+/// How far a turn is on the other side of its target: 2/π · min(a, π − a, b, π − b) of the two bends a and b; 0 on
+/// the same side, and for turns that are straight or folded back, which have no side.
+fn switched(target_turn_rad: f64, turn_rad: f64) -> f64 {
+    if target_turn_rad * turn_rad >= 0.0 {
+        return 0.0;
+    }
+    let off = |turn: f64| turn.abs().min(PI - turn.abs());
+    off(target_turn_rad).min(off(turn_rad)).max(0.0) / FRAC_PI_2
 }
 
 fn placement(problem: &Problem, heading_rad: &[f64]) -> f64 {

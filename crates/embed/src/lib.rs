@@ -3,7 +3,7 @@
 //! | step | file | what |
 //! |--:|---|---|
 //! | 1 | `targets`, `siblings` | target angles, lengths and headings from the tree and its views |
-//! | 2 | `problem`, `ratio` | the frozen problem; equation 3 between angles and ratios |
+//! | 2 | `problem`, `weights`, `ratio` | the frozen problem; the user's weights; equation 3 between angles and ratios |
 //! | 3 | `layout/…` | the methods: `projection`, `radial`, `cone`, `pso` (with `start`) |
 //! | 4 | `batch`, `crossing` | the swarm's energy, many particles at once, and its strict crossing count |
 //! | 5 | `pose` | one rigid motion of the whole, mirrored or not; rounding to what is written |
@@ -44,13 +44,14 @@ mod separation;
 mod siblings;
 mod solver;
 mod targets;
+mod weights;
 
 use espalier_model::{Embedding, Report, Tree, ViewHierarchy};
 
 pub use certify::certify;
 pub use choices::{CrossingWeight, Freedom, Method, PoseMode, Pull, Start, TargetMode};
 pub use error::Error;
-pub use params::{Params, PsoParams, SolverParams};
+pub use params::{Params, PsoParams, SolverParams, WeightRule};
 
 /// How far the swarm is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -123,8 +124,11 @@ pub fn embed(
         return Err(Error::Scale { length_mm });
     }
     let branches = tree.branches();
+    let weights_report = weights::check(tree, &branches, params)?;
     let targets = targets::targets(tree, &branches, views, params.targets)?;
     let problem = problem::Problem::new(tree, branches, targets, params);
     let layouts = select::run_methods(&problem, views, params, seed, progress)?;
-    select::select(&problem, layouts, params, seed)
+    let mut embedded = select::select(&problem, layouts, params, seed)?;
+    embedded.report.extend(weights_report);
+    Ok(embedded)
 }

@@ -3,7 +3,7 @@
 //! **Input** tree, targets, params. **Output** `Problem`. **Notation** N nodes, M segments (branches), L the
 //! tree's length; arrays have one entry per node, that of the root is 0.
 //! **Guarantees** with `w_crossing = "auto"` one crossing costs more than any layout without crossings: length
-//! ratios are in (−1, 1], angle ratios in [−1, 2], headings at most π off, so E ≤ M (w_l + 4 w_a + π² w_g).
+//! ratios are in (−1, 1], angle ratios in [−1, 2], headings at most π off, so E ≤ M (w_l + 4 w_a + w_s + π² w_g), of weights that differ the largest.
 //! **Source** [Hu2022] section 3.2.2.
 //! **Differs from the source** its largest angle loss is 1, because its layouts never change the side of a turn;
 //! baselines do, and shall be scored by the same energy.
@@ -16,6 +16,7 @@ use espalier_model::{Branches, Targets, Tree};
 use crate::choices::CrossingWeight;
 use crate::params::Params;
 use crate::ratio;
+use crate::weights::Weights;
 
 /// A tree with targets and weights.
 #[derive(Clone)]
@@ -39,10 +40,13 @@ pub(crate) struct Problem<'a> {
     pub(crate) free_angle: Vec<bool>,
     /// Whether the length ratio of each segment may be chosen. A pinned one stays 0, as above.
     pub(crate) free_length: Vec<bool>,
-    /// What r_l² costs: w_l over the number of edges of the branch.
+    /// What r_l² costs: the node's w_l over the number of edges of its branch.
     pub(crate) length_cost: Vec<f64>,
-    /// What r_a² costs: w_a over the number of angles of the branch; 0 for children of the root.
+    /// What r_a² costs: the node's w_a over the number of angles of its branch; 0 for children of the root.
     pub(crate) angle_cost: Vec<f64>,
+    /// What it costs to turn to the other side, by how far: w_s over the number of angles of the branch; 0 for
+    /// children of the root.
+    pub(crate) side_cost: Vec<f64>,
     /// What (h − H)² costs: w_g (M/L) conf² l.
     pub(crate) placement_cost: Vec<f64>,
     /// cos H and sin H, each times the placement cost, to find the best rotation.
@@ -63,13 +67,16 @@ impl<'a> Problem<'a> {
         let n_segments = branches.list().len() as f64;
         let length_mm = tree.length_mm();
 
-        let (mut length_cost, mut angle_cost) = (vec![0.0; n_nodes], vec![0.0; n_nodes]);
+        let weights = Weights::new(tree, &branches, params);
+        let mut length_cost = vec![0.0; n_nodes];
+        let (mut angle_cost, mut side_cost) = (length_cost.clone(), length_cost.clone());
         for segment in branches.list() {
             let n_angles = segment.nodes.clone().filter(|&node| parent[node] != 0).count();
             for node in segment.nodes.clone() {
-                length_cost[node] = params.w_length / segment.nodes.len() as f64;
+                length_cost[node] = weights.length[node] / segment.nodes.len() as f64;
                 if parent[node] != 0 {
-                    angle_cost[node] = params.w_angle / n_angles as f64;
+                    angle_cost[node] = weights.angle[node] / n_angles as f64;
+                    side_cost[node] = params.w_side / n_angles as f64;
                 }
             }
         }
@@ -88,7 +95,8 @@ impl<'a> Problem<'a> {
         let crossing_weight = match params.w_crossing {
             CrossingWeight::Fixed(weight) => weight,
             CrossingWeight::Auto => {
-                let largest = params.w_length + 4.0 * params.w_angle + PI * PI * params.w_placement;
+                let (w_length, w_angle) = weights.largest();
+                let largest = w_length + 4.0 * w_angle + params.w_side + PI * PI * params.w_placement;
                 // A tree without weights still has crossings to avoid.
                 1.5 * (n_segments * largest).max(1.0)
             }
@@ -110,6 +118,7 @@ impl<'a> Problem<'a> {
             free_length,
             length_cost,
             angle_cost,
+            side_cost,
             placement_cost,
             placement_cos,
             placement_sin,

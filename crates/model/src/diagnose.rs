@@ -1,5 +1,7 @@
 //! What every error of espalier can say about itself.
 
+use std::borrow::Cow;
+
 /// The class of an error, which decides the exit code of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Class {
@@ -57,8 +59,8 @@ pub trait Diagnose: std::error::Error {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{key}: {message}")]
 pub struct ParamError {
-    /// The key inside the stage's table, such as `particles`.
-    pub key: &'static str,
+    /// The key inside the stage's table, such as `particles`; of a list with its place, such as `weights[2].nodes`.
+    pub key: Cow<'static, str>,
     /// What is wrong with its value, with the range allowed: `must be at least 2, is 0`.
     pub message: String,
 }
@@ -68,8 +70,12 @@ impl ParamError {
     ///
     /// # Errors
     /// If not `is_legal`.
-    pub fn check(key: &'static str, is_legal: bool, message: impl Into<String>) -> Result<(), Self> {
-        if is_legal { Ok(()) } else { Err(Self { key, message: message.into() }) }
+    pub fn check(
+        key: impl Into<Cow<'static, str>>,
+        is_legal: bool,
+        message: impl Into<String>,
+    ) -> Result<(), Self> {
+        if is_legal { Ok(()) } else { Err(Self { key: key.into(), message: message.into() }) }
     }
 }
 

@@ -64,6 +64,8 @@ pub struct Energy {
     pub length: f64,
     /// Σ over branches of w_a · mean r_a².
     pub angle: f64,
+    /// Ours: Σ over branches of w_s · mean of how far a turn is on the other side of its target, in [0, 1].
+    pub side: f64,
     /// The relative placement term, ours: w_g (M/L) Σ conf² l (h − H)².
     pub placement: f64,
     /// w_X · crossings.
@@ -74,7 +76,7 @@ impl Energy {
     /// The sum of the parts.
     #[must_use]
     pub fn total(&self) -> f64 {
-        self.length + self.angle + self.placement + self.crossing
+        self.length + self.angle + self.side + self.placement + self.crossing
     }
 }
 

@@ -2,12 +2,16 @@
 
 mod pso;
 mod solver;
+mod weights;
+
+use std::borrow::Cow;
 
 use espalier_model::diagnose::ParamError;
 use serde::{Deserialize, Serialize};
 
 pub use pso::PsoParams;
 pub use solver::SolverParams;
+pub use weights::WeightRule;
 
 use crate::choices::{CrossingWeight, Method, PoseMode, TargetMode};
 
@@ -38,10 +42,18 @@ pub struct Params {
     /// Weight w_g of the relative placement, ≥ 0: how much an edge should point as it does in the global view.
     /// Default 0.01, small enough to decide only between layouts of like angles; the paper has none (0).
     pub w_placement: f64,
+    /// Weight w_s of the side of a turn, ≥ 0: what it costs that a bend goes to the other side of its target,
+    /// beside its angle ratio: per branch, w_s times the mean of 2/π · min(a, π − a, b, π − b) over such bends, a of
+    /// the target, b as drawn. Default 0, the paper's: a mirror image is as true as what it
+    /// mirrors. Larger keeps zigzags zigzags and arcs arcs, at the cost of other losses.
+    pub w_side: f64,
     /// Price of one crossing: `"auto"` or a number > 0. Default `"auto"`, section 3.2.2 of the paper: 1.5 times
     /// the largest possible loss, so that one crossing costs more than any layout without. The 0.2 of section 5
     /// can leave crossings to the swarm; such a result is never used.
     pub w_crossing: CrossingWeight,
+    /// `[[embed.weights]]`: other weights for parts of the tree, by generation, depth, branch or node; of rules
+    /// that meet the later one wins. Default none.
+    pub weights: Vec<WeightRule>,
     /// `[embed.solver]`: our optimiser.
     pub solver: SolverParams,
     /// `[embed.pso]`: the paper's particle swarm.
@@ -58,7 +70,9 @@ impl Default for Params {
             w_length: 2.0,
             w_angle: 2.0,
             w_placement: 0.01,
+            w_side: 0.0,
             w_crossing: CrossingWeight::Auto,
+            weights: Vec::new(),
             solver: SolverParams::default(),
             pso: PsoParams::default(),
         }
@@ -84,11 +98,13 @@ impl Params {
     /// # Errors
     /// The first parameter outside its range.
     pub fn validate(&self) -> Result<(), ParamError> {
-        let weights =
-            [("w_length", self.w_length), ("w_angle", self.w_angle), ("w_placement", self.w_placement)];
-        for (key, weight) in weights {
-            let is_legal = (0.0..=1e6).contains(&weight);
-            ParamError::check(key, is_legal, format!("must be from 0 to 1e6, is {weight}"))?;
+        for (key, weight) in [
+            ("w_length", self.w_length),
+            ("w_angle", self.w_angle),
+            ("w_placement", self.w_placement),
+            ("w_side", self.w_side),
+        ] {
+            check_weight(key, weight)?;
         }
         if let CrossingWeight::Fixed(weight) = self.w_crossing {
             let is_legal = weight > 0.0 && weight <= 1e12;
@@ -98,7 +114,13 @@ impl Params {
                 format!("must be \"auto\" or in (0, 1e12], is {weight}"),
             )?;
         }
+        self.weights.iter().enumerate().try_for_each(|(idx, rule)| rule.validate(idx))?;
         self.solver.validate()?;
         self.pso.validate()
     }
+}
+
+/// Checks one weight of the energy.
+fn check_weight(key: impl Into<Cow<'static, str>>, weight: f64) -> Result<(), ParamError> {
+    ParamError::check(key, (0.0..=1e6).contains(&weight), format!("must be from 0 to 1e6, is {weight}"))
 }

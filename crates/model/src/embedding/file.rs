@@ -214,6 +214,7 @@ struct TargetsFile {
 struct EnergyFile {
     length: f64,
     angle: f64,
+    side: f64,
     placement: f64,
     crossing: f64,
 }
@@ -453,7 +454,7 @@ macro_rules! same_variants {
     };
 }
 
-same_fields!(Energy, EnergyFile { length, angle, placement, crossing });
+same_fields!(Energy, EnergyFile { length, angle, side, placement, crossing });
 same_fields!(TracePoint, TracePointFile { iteration, evaluations, energy, crossings });
 same_fields!(
     Losses,

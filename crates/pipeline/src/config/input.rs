@@ -167,7 +167,7 @@ impl Input {
         let path = match in_data {
             Some(rest) => {
                 let data_dir = data_dir.ok_or_else(|| ParamError {
-                    key: "path",
+                    key: "path".into(),
                     message: format!("{written}: the variable ESPALIER_DATA is not set"),
                 })?;
                 data_dir.join(rest.trim_start_matches('/'))

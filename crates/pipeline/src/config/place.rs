@@ -29,10 +29,13 @@ impl SourceText<'_> {
 
     /// The error of a value out of range, at `key` in `table` (empty for the top level).
     pub(super) fn value_error(&self, table: &str, error: &ParamError) -> Box<ConfigError> {
-        let dotted = if table.is_empty() { error.key.to_owned() } else { format!("{table}.{}", error.key) };
+        let dotted = if table.is_empty() { error.key.to_string() } else { format!("{table}.{}", error.key) };
         let title = format!("{dotted}: {}", error.message);
-        if let Some(Override { key, value }) = self.overrides.iter().rev().find(|set| set.key == dotted) {
-            let rendered = format!("--set {key}={value}: {}", error.message);
+        if let Some(Override { key, value }) =
+            self.overrides.iter().rev().find(|set| covers(&set.key, &dotted))
+        {
+            let cause = if *key == dotted { error.message.as_str() } else { title.as_str() };
+            let rendered = format!("--set {key}={value}: {cause}");
             return Box::new(ConfigError { rendered, hint: String::new() });
         }
         self.at(self.find(&dotted), &title, String::new())
@@ -72,11 +75,19 @@ impl SourceText<'_> {
         let mut table = root.get_ref();
         let mut place = None;
         let mut names = dotted.split('.').peekable();
-        while let Some((name, value)) = names.next().and_then(|name| entry(table, name)) {
-            if names.peek().is_none() {
-                return Some(name.start..value.span().end);
-            }
+        while let Some(step) = names.next() {
+            let (name, idx) = with_index(step);
+            let Some((name, mut value)) = entry(table, name) else { break };
+            let mut span = name.start..value.span().end;
             place = Some(name);
+            if let (Some(idx), DeValue::Array(list)) = (idx, value.get_ref()) {
+                let Some(item) = list.get(idx) else { break };
+                (value, span) = (item, item.span());
+                place = Some(item.span());
+            }
+            if names.peek().is_none() {
+                return Some(span);
+            }
             match value.get_ref() {
                 DeValue::Table(inner) => table = inner,
                 _ => break,
@@ -96,21 +107,49 @@ fn entry<'t, 'i>(table: &'t DeTable<'i>, key: &str) -> Option<(Range<usize>, &'t
     table.iter().find(|(name, _)| name.get_ref() == key).map(|(name, value)| (name.span(), value))
 }
 
-/// Puts `value` at the dotted `key`, making tables on the way.
+/// Whether what `--set` lays at `key` reaches the value at `dotted`: the very key, or one that it lies in.
+fn covers(key: &str, dotted: &str) -> bool {
+    dotted.strip_prefix(key).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+}
+
+/// A step of a dotted key and its place in a list: `weights[2]` is the third of `weights`.
+fn with_index(step: &str) -> (&str, Option<usize>) {
+    step.strip_suffix(']')
+        .and_then(|open| open.split_once('['))
+        .and_then(|(name, idx)| Some((name, Some(idx.parse().ok()?))))
+        .unwrap_or((step, None))
+}
+
+/// Puts `value` at the dotted `key`, making tables on the way; `[i]` chooses from a list, or adds to its end.
 fn lay(table: &mut Table, key: &str, value: Value) -> Result<(), String> {
     let (tables, last) = key.rsplit_once('.').unwrap_or(("", key));
     if last.is_empty() {
         return Err("the key is empty; write --set stage.key=value".to_owned());
     }
     let mut inner = table;
-    for name in tables.split('.').filter(|name| !name.is_empty()) {
-        inner = match inner.entry(name).or_insert_with(|| Value::Table(Table::new())) {
+    for step in tables.split('.').filter(|step| !step.is_empty()) {
+        inner = match slot(inner, step, Value::Table(Table::new()))? {
             Value::Table(next) => next,
-            _ => return Err(format!("{name} is a value, not a table")),
+            _ => return Err(format!("{step} is a value, not a table")),
         };
     }
-    inner.insert(last.to_owned(), value);
+    *slot(inner, last, Value::Boolean(false))? = value;
     Ok(())
+}
+
+/// The value at a step, `empty` if there is none yet.
+fn slot<'t>(table: &'t mut Table, step: &str, empty: Value) -> Result<&'t mut Value, String> {
+    let (name, Some(idx)) = with_index(step) else {
+        return Ok(table.entry(step).or_insert(empty));
+    };
+    let Value::Array(list) = table.entry(name).or_insert_with(|| Value::Array(Vec::new())) else {
+        return Err(format!("{name} is no list"));
+    };
+    let n_items = list.len();
+    if idx == n_items {
+        list.push(empty);
+    }
+    list.get_mut(idx).ok_or_else(|| format!("{name} has {n_items} entries, the next is {name}[{n_items}]"))
 }
 
 /// A value as TOML; what is not TOML is a string, so that `--set embed.method=radial` needs no quotes.
@@ -144,4 +183,88 @@ fn suggestion(message: &str) -> String {
 fn first_line(message: &str) -> &str {
     let line = message.lines().next().unwrap_or_default();
     if line.starts_with("unknown") { line.split(", expected").next().unwrap_or(line) } else { line }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+
+    const TEXT: &str = "schema = 1
+[input]
+phantom = \"neuron\"
+[[embed.weights]]
+generations = [0, 2]
+w_length = 10
+[[embed.weights]]
+branches = [3, 7]
+w_angle = -1
+";
+
+    fn parse(text: &str, sets: &[(&str, &str)]) -> Result<Config, String> {
+        let set =
+            |(key, value): &(&str, &str)| Override { key: (*key).to_owned(), value: (*value).to_owned() };
+        let overrides: Vec<Override> = sets.iter().map(set).collect();
+        Config::parse(text, Path::new("a.toml"), &overrides).map_err(|error| error.to_string())
+    }
+
+    #[track_caller]
+    fn refused(text: &str, sets: &[(&str, &str)], fragments: &[&str]) {
+        let error = parse(text, sets).expect_err("refused");
+        for fragment in fragments {
+            assert!(error.contains(fragment), "no {fragment:?} in: {error}");
+        }
+    }
+
+    #[test]
+    fn a_list_entry_is_found_at_its_line() {
+        refused(TEXT, &[], &["a.toml:9: embed.weights[1].w_angle: must be from 0 to 1e6, is -1"]);
+        let no_weight = TEXT.replace("w_angle = -1\n", "");
+        refused(&no_weight, &[], &["a.toml:7: embed.weights[1]: says no weight"]);
+        let typo = TEXT.replace("w_angle", "w_angel");
+        refused(&typo, &[], &["a.toml:9: unknown field `w_angel`"]);
+        let inverted = TEXT.replace("[0, 2]", "[2, 0]").replace("-1", "1");
+        refused(&inverted, &[], &["a.toml:5: embed.weights[0].generations", "is [2, 0]"]);
+        let nowhere = TEXT.replace("branches = [3, 7]\n", "").replace("-1", "1");
+        refused(&nowhere, &[], &["a.toml:7: embed.weights[1]: says not where"]);
+    }
+
+    #[test]
+    fn a_list_entry_can_be_set() {
+        let config = parse(&TEXT.replace("-1", "1"), &[("embed.weights[1].w_angle", "4")]).expect("a config");
+        assert_eq!(config.embed.weights[1].w_angle, Some(4.0));
+        assert_eq!(config.embed.weights[0].w_length, Some(10.0));
+        // Written out and read again, it is the same config.
+        assert_eq!(parse(&config.to_toml(), &[]), Ok(config));
+        let text = "schema = 1\n[input]\nphantom = \"neuron\"\n";
+        let whole = [
+            ("embed.weights", "[{ nodes = [4], w_length = 3.0 }]"),
+            ("embed.weights[1]", "{ nodes = [5], w_angle = 1 }"),
+        ];
+        let config = parse(text, &whole).expect("a config");
+        assert_eq!(config.embed.weights.len(), 2);
+        assert_eq!(config.embed.weights[1].nodes, Some(vec![5]));
+    }
+
+    #[test]
+    fn what_cannot_be_set_is_named() {
+        let text = "schema = 1\n[input]\nphantom = \"neuron\"\n";
+        refused(
+            text,
+            &[("embed.weights", "[{ nodes = [4], w_length = -3 }]")],
+            &["--set embed.weights=", "embed.weights[0].w_length: must be from 0 to 1e6"],
+        );
+        refused(
+            text,
+            &[("embed.weights[4].w_angle", "1")],
+            &["--set embed.weights[4].w_angle=1: weights has 0 entries"],
+        );
+        refused(text, &[("embed.method[0]", "1")], &["--set embed.method[0]=1"]);
+        refused(TEXT, &[], &["embed.weights[1].w_angle"]);
+        refused(
+            &TEXT.replace("-1", "1"),
+            &[("embed.weights[1].w_angle", "-2")],
+            &["--set embed.weights[1].w_angle=-2: must be"],
+        );
+    }
 }

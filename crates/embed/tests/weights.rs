@@ -1,0 +1,174 @@
+//! The user's weights: what they change, and what they must not.
+
+#![allow(clippy::expect_used, reason = "a test that cannot go on says why")]
+
+mod common;
+
+use common::{random_tree, tree_of, views_along};
+use espalier_embed::{Method, Params, PsoParams, WeightRule, embed};
+use espalier_model::diagnose::{Class, Diagnose};
+use espalier_model::{Embedding, Tree};
+use glam::DVec3;
+
+/// The swarm alone, small.
+fn small() -> Params {
+    let pso = PsoParams { particles: 24, iterations: 20, ..PsoParams::default() };
+    Params { method: Method::Pso, methods: vec![Method::Projection, Method::Pso], pso, ..Params::default() }
+}
+
+fn rule() -> WeightRule {
+    WeightRule::default()
+}
+
+fn with(rules: &[WeightRule]) -> Params {
+    Params { weights: rules.to_vec(), ..small() }
+}
+
+fn laid_flat(tree: &Tree, params: &Params) -> Embedding {
+    embed(tree, &views_along(tree, DVec3::Z), params, 7, &|_| {}).expect("a certified layout").embedding
+}
+
+#[test]
+fn rules_that_say_what_the_whole_says_change_no_bit() {
+    for key in 0..8 {
+        let tree = random_tree(key as usize, 50, 1.0, false, key);
+        let plain = Params { w_length: 3.0, w_angle: 0.7, ..small() };
+        let everywhere = WeightRule { generations: Some([0, u32::MAX]), w_length: Some(3.0), ..rule() };
+        let ruled = Params {
+            weights: vec![
+                everywhere,
+                WeightRule { depth_mm: Some([0.0, 2.0]), w_angle: Some(0.7), ..rule() },
+            ],
+            ..plain.clone()
+        };
+        assert_eq!(laid_flat(&tree, &plain).to_json(), laid_flat(&tree, &ruled).to_json(), "tree {key}");
+    }
+}
+
+#[test]
+fn the_energy_has_the_weights_of_each_node() {
+    for key in 0..16 {
+        let tree = random_tree(key as usize % 8, 60, 1.0, false, key);
+        let branches = tree.branches();
+        let last = branches.list().len() as u32 - 1;
+        let rules = [
+            WeightRule { generations: Some([1, 2]), w_length: Some(5.0), ..rule() },
+            WeightRule { branches: Some(vec![last]), w_length: Some(0.0), w_angle: Some(11.0), ..rule() },
+        ];
+        let embedding = laid_flat(&tree, &with(&rules));
+        let (mut length, mut angle) = (0.0, 0.0);
+        for (idx, branch) in branches.list().iter().enumerate() {
+            let is_last = idx as u32 == last;
+            let in_rule = (1..=2).contains(&branch.generation);
+            let w_length = if is_last {
+                0.0
+            } else if in_rule {
+                5.0
+            } else {
+                2.0
+            };
+            let w_angle = if is_last { 11.0 } else { 2.0 };
+            let mean = |ratios: &[f64], nodes: Vec<usize>| {
+                let sum: f64 = nodes.iter().map(|&node| ratios[node] * ratios[node]).sum();
+                sum / (nodes.len() as f64).max(1.0)
+            };
+            length += w_length * mean(&embedding.length_ratio, branch.nodes.clone().collect());
+            let turning = branch.nodes.clone().filter(|&node| tree.parent(node) != Some(0)).collect();
+            angle += w_angle * mean(&embedding.angle_ratio, turning);
+        }
+        assert!((embedding.energy.length - length).abs() < 1e-9 * length.max(1.0), "tree {key}");
+        assert!((embedding.energy.angle - angle).abs() < 1e-9 * angle.max(1.0), "tree {key}");
+    }
+}
+
+/// Σ r² over the nodes of the first generations, and over the others.
+fn shallow_and_deep(tree: &Tree, ratios: &[f64]) -> (f64, f64) {
+    let branches = tree.branches();
+    (1..tree.n_nodes()).fold((0.0, 0.0), |(shallow, deep), node| {
+        let square = ratios[node] * ratios[node];
+        let branch = branches.of_node(node).expect("a branch");
+        if branches.list()[branch].generation <= 2 {
+            (shallow + square, deep)
+        } else {
+            (shallow, deep + square)
+        }
+    })
+}
+
+#[test]
+fn weights_near_the_root_keep_what_is_near_the_root() {
+    let (mut plain, mut heavy) = ((0.0, 0.0), (0.0, 0.0));
+    for key in 0..12 {
+        // Bushy trees in space, which no layout can draw without losses.
+        let tree = random_tree(1, 63, 0.5, false, 100 + key);
+        let stiff = WeightRule { generations: Some([0, 2]), w_angle: Some(200.0), ..rule() };
+        let pso = PsoParams { particles: 64, iterations: 40, ..PsoParams::default() };
+        for (sum, rules) in [(&mut plain, vec![]), (&mut heavy, vec![stiff])] {
+            let params = Params { pso: pso.clone(), ..with(&rules) };
+            let (shallow, deep) = shallow_and_deep(&tree, &laid_flat(&tree, &params).angle_ratio);
+            *sum = (sum.0 + shallow, sum.1 + deep);
+        }
+    }
+    assert!(heavy.0 < plain.0, "near the root {plain:?} {heavy:?}");
+    assert!(heavy.1 > plain.1, "at the cost of others {plain:?} {heavy:?}");
+}
+
+#[test]
+fn a_crossing_costs_more_than_the_heaviest_rule() {
+    for key in 0..16 {
+        let tree = random_tree(key as usize % 8, 40, 1.0, false, key);
+        let heavy =
+            WeightRule { generations: Some([0, 99]), w_length: Some(1e6), w_angle: Some(1e6), ..rule() };
+        let params = Params { w_side: 3.0, ..with(&[heavy]) };
+        let embedding = laid_flat(&tree, &params);
+        for row in embedding.methods.iter().filter(|row| row.crossings > 0) {
+            let bound = 1.5 * tree.branches().list().len() as f64 * 5e6;
+            assert!(row.energy.crossing >= bound, "tree {key}: {:?}", row.energy);
+        }
+        assert!(embedding.certificate.holds());
+    }
+}
+
+#[test]
+fn the_other_side_costs_what_w_side_says() {
+    // Two edges at a right angle; the only turn with a loss is that of node 2.
+    let bent = tree_of(&[(0.0, 0.0, 0.0, None), (1.0, 0.0, 0.0, Some(0)), (1.0, 1.0, 0.0, Some(1))]);
+    // Seen from behind the turn goes to the other side: the projection of one view against targets of another.
+    let mut views = views_along(&bent, DVec3::Z);
+    views.global = views_along(&bent, DVec3::NEG_Z).global;
+    let params = |w_side: f64| Params { w_side, w_placement: 0.0, ..small() };
+    let energy = |w_side: f64| {
+        let embedding = embed(&bent, &views, &params(w_side), 0, &|_| {}).expect("a layout").embedding;
+        let row = embedding.methods.iter().find(|row| row.method == "projection").expect("a row");
+        row.energy
+    };
+    let (free, priced) = (energy(0.0), energy(3.0));
+    assert_eq!(free.side, 0.0);
+    assert!(
+        (priced.side - 3.0).abs() < 1e-9,
+        "a right angle is as far from either side as can be: {priced:?}"
+    );
+    assert_eq!(priced.angle, free.angle);
+    assert!((priced.total() - free.total() - 3.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_rule_for_a_part_that_is_not_there() {
+    let tree = random_tree(0, 30, 1.0, false, 3);
+    let refused = |rule: WeightRule| {
+        let params = with(&[WeightRule { w_angle: Some(1.0), ..rule }]);
+        embed(&tree, &views_along(&tree, DVec3::Z), &params, 0, &|_| {}).expect_err("refused")
+    };
+    let error = refused(WeightRule { nodes: Some(vec![30]), ..rule() });
+    assert_eq!(error.to_string(), "embed: weights[0].nodes: there is no 30: they are 1 to 29");
+    assert_eq!(error.class(), Class::Usage);
+    assert!(
+        refused(WeightRule { branches: Some(vec![999]), ..rule() })
+            .to_string()
+            .contains("weights[0].branches")
+    );
+
+    let empty = with(&[WeightRule { depth_mm: Some([1e3, 1e4]), w_angle: Some(1.0), ..rule() }]);
+    let report = embed(&tree, &views_along(&tree, DVec3::Z), &empty, 0, &|_| {}).expect("a layout").report;
+    assert_eq!(report.warnings[0].code, "W-EMBED-NO-SUCH-PART");
+}
