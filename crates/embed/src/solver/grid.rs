@@ -147,16 +147,21 @@ impl EdgeGrid {
         self.of_edge[edge as usize] = entry_idx;
     }
 
-    fn list_of(&self, (column, row): (i32, i32)) -> usize {
-        // Two odd constants near 2³² / golden ratio and its square spread neighbours over the table.
-        let mixed = (column as u32).wrapping_mul(0x9E37_79B1) ^ (row as u32).wrapping_mul(0x85EB_CA77);
-        (mixed ^ (mixed >> 15)) as usize & (self.heads.len() - 1)
+    fn list_of(&self, cell: (i32, i32)) -> usize {
+        mix(cell) & (self.heads.len() - 1)
     }
+}
+
+/// The hash of a cell.
+pub(super) fn mix((column, row): (i32, i32)) -> usize {
+    // Two odd constants near 2³² / golden ratio and its square spread neighbours over the table.
+    let mixed = (column as u32).wrapping_mul(0x9E37_79B1) ^ (row as u32).wrapping_mul(0x85EB_CA77);
+    (mixed ^ (mixed >> 15)) as usize
 }
 
 /// Visits the cells within `margin` of a segment, all in units of a cell, until `visit` says no; whether it never
 /// did.
-fn each_cell(a: DVec2, b: DVec2, margin: f64, mut visit: impl FnMut((i32, i32)) -> bool) -> bool {
+pub(super) fn each_cell(a: DVec2, b: DVec2, margin: f64, mut visit: impl FnMut((i32, i32)) -> bool) -> bool {
     let (low, high) = if a.y <= b.y { (a, b) } else { (b, a) };
     let (first_row, last_row) = (floor(low.y - margin), floor(high.y + margin));
     let slope = if high.y > low.y { (high.x - low.x) / (high.y - low.y) } else { 0.0 };

@@ -3,12 +3,14 @@
 //! | file | what |
 //! |---|---|
 //! | `shape` | a layout by its ratios |
+//! | `barrier/…` | all ratios at once, under a barrier |
 //! | `grid` | edges by cells: who may be near whom |
 //! | `work` | the budget |
 //!
 //! **Input** the problem and the cone. **Output** a layout without crossings.
 //! **Source** ours; the energy is Eq. 4 of [Hu2022].
 
+mod barrier;
 mod grid;
 mod shape;
 mod work;
