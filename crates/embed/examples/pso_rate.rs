@@ -9,7 +9,7 @@
 use std::error::Error;
 use std::time::Instant;
 
-use espalier_embed::{Freedom, Params, PsoParams, embed};
+use espalier_embed::{Event, Freedom, Params, PsoParams, embed};
 use espalier_model::swc::{SwcScale, parse};
 use espalier_model::{MethodRow, Node, Tree};
 use espalier_phantom::Kind;
@@ -42,7 +42,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{} nodes, {} branches, {params:?}", tree.n_nodes(), tree.branches().list().len());
 
     let start = Instant::now();
-    let embedded = embed(&tree, &views, &params, seed, &|p| {
+    let embedded = embed(&tree, &views, &params, seed, &|event| {
+        let Event::Searching(p) = event else { return };
         let seconds = start.elapsed().as_secs_f64();
         println!(
             "{:>4}/{} energy {:<12.6} crossings {:<4} evaluations {:>8} {seconds:.2} s {:.0}/s",

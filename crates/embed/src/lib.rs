@@ -8,7 +8,7 @@
 //! | 4 | `batch`, `crossing` | the swarm's energy, many particles at once, and its strict crossing count |
 //! | 5 | `pose` | one rigid motion of the whole, mirrored or not; rounding to what is written |
 //! | 6 | `certify`, `overlap` | the exact certificate; overlaps of the drawn tubes |
-//! | 7 | `energy`, `losses`, `distances` | the one energy and all losses, for every method alike |
+//! | 7 | `energy`, `losses/…`, `distances` | the one energy and all losses, for every method alike |
 //! | 8 | `select` | the best certified layout, and the table of all |
 //!
 //! **Cost** Targets, radial, cone, pose and energy are linear in N. The certificate sorts and sweeps, N log N on
@@ -46,7 +46,7 @@ mod solver;
 mod targets;
 mod weights;
 
-use espalier_model::{Embedding, Report, Tree, ViewHierarchy};
+use espalier_model::{Comparison, Embedding, Report, Tree, ViewHierarchy};
 
 pub use certify::certify;
 pub use choices::{CrossingWeight, Freedom, Method, PoseMode, Pull, Start, TargetMode};
@@ -68,11 +68,31 @@ pub struct Progress {
     pub crossings: usize,
 }
 
+/// What happens while a tree is laid flat. Methods run one after the other.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Event {
+    /// A method begins.
+    Started {
+        /// The method.
+        method: Method,
+    },
+    /// A method that searches goes on.
+    Searching(Progress),
+    /// A method has its layout.
+    Finished {
+        /// Its name as in `compare.tsv`, with its size where that matters.
+        name: String,
+    },
+}
+
 /// A tree laid flat, and what was done.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Embedded {
     /// The layout with its certificate.
     pub embedding: Embedding,
+    /// The layouts of all methods, scored alike.
+    pub comparison: Comparison,
     /// Counts and warnings.
     pub report: Report,
 }
@@ -80,8 +100,9 @@ pub struct Embedded {
 /// Lays a tree flat without crossings.
 ///
 /// Runs the methods asked for, scores them by one energy against one set of targets, and returns the best
-/// certified layout (see [`Params::method`]). `progress` is called once per iteration of the swarm. Parallel in
-/// the current thread pool; the result depends on `tree`, `views`, `params` and `seed` only.
+/// certified layout (see [`Params::method`]). `events` is called when a method begins and ends, and once per
+/// iteration of the swarm. Parallel in the current thread pool; the result depends on `tree`, `views`, `params` and
+/// `seed` only.
 ///
 /// # Errors
 /// A parameter out of range, views of another tree, a tree too small or too large for exact arithmetic, a swarm
@@ -116,7 +137,7 @@ pub fn embed(
     views: &ViewHierarchy,
     params: &Params,
     seed: u64,
-    progress: &(dyn Fn(Progress) + Sync),
+    events: &(dyn Fn(Event) + Sync),
 ) -> Result<Embedded, Error> {
     params.validate()?;
     let length_mm = tree.length_mm();
@@ -127,7 +148,7 @@ pub fn embed(
     let weights_report = weights::check(tree, &branches, params)?;
     let targets = targets::targets(tree, &branches, views, params.targets)?;
     let problem = problem::Problem::new(tree, branches, targets, params);
-    let layouts = select::run_methods(&problem, views, params, seed, progress)?;
+    let layouts = select::run_methods(&problem, views, params, seed, events)?;
     let mut embedded = select::select(&problem, layouts, params, seed)?;
     embedded.report.extend(weights_report);
     Ok(embedded)

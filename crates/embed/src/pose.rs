@@ -54,7 +54,7 @@ pub(crate) fn pose(problem: &Problem, positions: &[DVec2], mode: PoseMode) -> Po
     let mirrored_rad: Vec<f64> = heading_rad.iter().map(|h| PI - h).collect();
     let (agreement, weight) = agreement(problem, &heading_rad);
     let (mirrored, _) = self::agreement(problem, &mirrored_rad);
-    let is_reflected = mirrored.length() > agreement.length() + NOTHING * weight;
+    let is_reflected = is_reflected(agreement, mirrored, weight);
     if is_reflected {
         posed.iter_mut().for_each(|p| *p = reflected(*p));
     }
@@ -76,8 +76,13 @@ pub(crate) fn pose(problem: &Problem, positions: &[DVec2], mode: PoseMode) -> Po
     Posed { positions: posed, pose: Pose { rotation_rad, is_reflected }, quantum_mm }
 }
 
+/// Whether the mirror image agrees better with the view, by more than rounding can.
+pub(crate) fn is_reflected(agreement: DVec2, mirrored: DVec2, weight: f64) -> bool {
+    mirrored.length() > agreement.length() + NOTHING * weight
+}
+
 /// A = Σ w e^{i(H − h)} and Σ w.
-fn agreement(problem: &Problem, heading_rad: &[f64]) -> (DVec2, f64) {
+pub(crate) fn agreement(problem: &Problem, heading_rad: &[f64]) -> (DVec2, f64) {
     let (mut sum, mut total) = (DVec2::ZERO, 0.0);
     for (node, &heading_rad) in heading_rad.iter().enumerate().skip(1) {
         let weight = problem.targets.confidence[node] * problem.targets.length_mm[node];

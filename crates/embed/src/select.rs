@@ -9,7 +9,8 @@
 //! **Cost** dominated by the swarm.
 
 use espalier_model::{
-    Certificate, Embedding, Losses, MethodRow, Report, TargetKind, Termination, TracePoint, ViewHierarchy,
+    Certificate, ComparedLayout, Comparison, Embedding, Losses, MethodRow, Report, TargetKind, Termination,
+    TracePoint, ViewHierarchy,
 };
 use rayon::prelude::*;
 
@@ -21,7 +22,7 @@ use crate::layout::{Layout, cone, projection, pso, radial};
 use crate::params::Params;
 use crate::pose::{self, Posed};
 use crate::problem::Problem;
-use crate::{Embedded, Progress, certify, losses, overlap, place, solver};
+use crate::{Embedded, Event, certify, losses, overlap, place, solver};
 
 /// Every layout that the params ask for, by method, each method once, in a fixed order.
 pub(crate) fn run_methods(
@@ -29,28 +30,47 @@ pub(crate) fn run_methods(
     views: &ViewHierarchy,
     params: &Params,
     seed: u64,
-    progress: &(dyn Fn(Progress) + Sync),
+    events: &(dyn Fn(Event) + Sync),
 ) -> Result<Vec<(Method, Layout)>, Error> {
     let wants = |method: Method| params.method == method || params.methods.contains(&method);
+    let placed =
+        |name: &str, headings: &[f64]| Ok(Layout::constructed(name, place::from_headings(problem, headings)));
     let mut layouts = Vec::new();
     if wants(Method::Projection) {
-        let positions = projection::positions(problem, &views.global);
-        layouts.push((Method::Projection, Layout::constructed("projection", positions)));
+        let project = || Ok(Layout::constructed("projection", projection::positions(problem, &views.global)));
+        layouts.push(announced(events, Method::Projection, project)?);
     }
     // Radial and cone cost next to nothing, and one of them is the way out when the method asked for crosses.
-    let (radial, cone) = (radial::headings(problem), cone::headings(problem));
-    let swarm = if wants(Method::Pso) {
-        Some(pso::layout(problem, (&radial, &cone), (&params.pso, seed), progress)?)
-    } else {
-        None
-    };
-    let solved = wants(Method::Solver).then(|| solver::layout(problem, &cone, params));
-    let (radial, cone) = (place::from_headings(problem, &radial), place::from_headings(problem, &cone));
-    layouts.push((Method::Radial, Layout::constructed("radial", radial)));
-    layouts.push((Method::Cone, Layout::constructed("cone", cone)));
-    layouts.extend(swarm.map(|layout| (Method::Pso, layout)));
-    layouts.extend(solved.map(|layout| (Method::Solver, layout)));
+    let (mut radial, mut cone) = (Vec::new(), Vec::new());
+    layouts.push(announced(events, Method::Radial, || {
+        radial = radial::headings(problem);
+        placed("radial", &radial)
+    })?);
+    layouts.push(announced(events, Method::Cone, || {
+        cone = cone::headings(problem);
+        placed("cone", &cone)
+    })?);
+    if wants(Method::Pso) {
+        let progress = |progress| events(Event::Searching(progress));
+        let swarm = || pso::layout(problem, (&radial, &cone), (&params.pso, seed), &progress);
+        layouts.push(announced(events, Method::Pso, swarm)?);
+    }
+    if wants(Method::Solver) {
+        layouts.push(announced(events, Method::Solver, || Ok(solver::layout(problem, &cone, params)))?);
+    }
     Ok(layouts)
+}
+
+/// Runs a method between the events of its beginning and its end.
+fn announced(
+    events: &(dyn Fn(Event) + Sync),
+    method: Method,
+    work: impl FnOnce() -> Result<Layout, Error>,
+) -> Result<(Method, Layout), Error> {
+    events(Event::Started { method });
+    let layout = work()?;
+    events(Event::Finished { name: layout.name.clone() });
+    Ok((method, layout))
 }
 
 /// Energies are equal if they differ by no more than this, or than this share of the larger: 1e-12 is the energy
@@ -99,9 +119,18 @@ pub(crate) fn select(
         .into_par_iter()
         .map(|(method, layout)| judge((problem, &space), method, layout, params.pose))
         .collect();
-    let methods: Vec<MethodRow> = judged.iter().map(|judged| row(judged, problem.targets.kind)).collect();
+    let layouts: Vec<ComparedLayout> =
+        judged.iter().map(|judged| compared(judged, problem.targets.kind)).collect();
+    let methods = layouts.iter().map(|layout| layout.row.clone()).collect();
     let trace = judged.iter().flat_map(|judged| judged.trace.clone()).collect();
     let winner_idx = winner(&judged, params.method)?;
+    let comparison = Comparison {
+        tree: problem.tree.digest(),
+        targets: problem.targets.digest(),
+        seed,
+        chosen: winner_idx,
+        layouts,
+    };
     let report = report(problem, &judged, &judged[winner_idx], params.method);
 
     let Judged { name, posed, certificate, scored, losses, method, .. } = judged.swap_remove(winner_idx);
@@ -129,7 +158,7 @@ pub(crate) fn select(
         trace,
         methods,
     };
-    Ok(Embedded { embedding, report })
+    Ok(Embedded { embedding, comparison, report })
 }
 
 /// The index of the layout to use.
@@ -152,8 +181,8 @@ fn winner(judged: &[Judged], asked: Method) -> Result<usize, Error> {
     })
 }
 
-fn row(judged: &Judged, targets: TargetKind) -> MethodRow {
-    MethodRow {
+fn compared(judged: &Judged, targets: TargetKind) -> ComparedLayout {
+    let row = MethodRow {
         method: judged.name.clone(),
         crossings: judged.certificate.crossings,
         overlaps: judged.overlaps.count,
@@ -161,7 +190,8 @@ fn row(judged: &Judged, targets: TargetKind) -> MethodRow {
         losses: judged.losses,
         evaluations: judged.evaluations,
         targets,
-    }
+    };
+    ComparedLayout { row, quantum_mm: judged.posed.quantum_mm, positions_mm: judged.posed.positions.clone() }
 }
 
 fn report(problem: &Problem, judged: &[Judged], winner: &Judged, asked: Method) -> Report {

@@ -16,7 +16,7 @@ use crate::problem::Problem;
 /// The tolerance as a share of the median edge length, and the least angle between neighbours in rad.
 const TOLERANCE: f64 = 1e-6;
 /// The clearance is at most this share of the path between two edges: near a fork edges have to be near.
-const GAP_SHARE: f64 = 0.2;
+pub(crate) const GAP_SHARE: f64 = 0.2;
 
 /// The rule of separation of a problem.
 pub(crate) struct Separation {

@@ -10,7 +10,7 @@ use espalier_embed::{
     certify, embed,
 };
 use espalier_model::diagnose::{Class, Diagnose};
-use espalier_model::{Embedding, MethodRow, Termination, Tree};
+use espalier_model::{Comparison, Embedding, MethodRow, Termination, Tree};
 use glam::{DVec2, DVec3};
 
 fn with_pso(pso: PsoParams) -> Params {
@@ -216,12 +216,22 @@ fn overlaps_are_those_of_thick_tubes() {
 #[test]
 fn json_and_tables() {
     let tree = random_tree(0, 60, 2.0, false, 3);
-    let embedding = laid_flat(&tree, &small()).embedding;
+    let Embedded { embedding, comparison, .. } = laid_flat(&tree, &small());
+    // All layouts are there, the embedding among them, and the digest of what they were scored against.
+    assert_eq!(Comparison::from_json(&comparison.to_json(), &tree).expect("our own file"), comparison);
+    assert_eq!(comparison.targets, embedding.targets.digest());
+    let rows: Vec<MethodRow> = comparison.layouts.iter().map(|layout| layout.row.clone()).collect();
+    assert_eq!(rows, embedding.methods);
+    let chosen = &comparison.layouts[comparison.chosen];
+    assert_eq!((&chosen.row.method, &chosen.positions_mm), (&embedding.method, &embedding.positions_mm));
+    for layout in &comparison.layouts {
+        assert_eq!(certify(&tree, &layout.positions_mm).crossings, layout.row.crossings);
+    }
     let json = embedding.to_json();
     let back = Embedding::from_json(&json, &tree).expect("our own file");
     assert_eq!(back.to_json(), json);
     assert_eq!(back.positions_mm, embedding.positions_mm);
-    assert!(json.starts_with("{\"format\":\"espalier-embedding\",\"version\":1,"));
+    assert!(json.starts_with("{\"format\":\"espalier-embedding\",\"version\":2,"));
 
     let smaller = random_tree(0, 59, 2.0, false, 3);
     let error = Embedding::from_json(&json, &smaller).expect_err("another tree");
@@ -229,7 +239,7 @@ fn json_and_tables() {
     let x = format!("{:?}", embedding.positions_mm[1].x);
     let off = json.replacen(&x, &format!("{x}00001"), 1);
     assert!(Embedding::from_json(&off, &tree).expect_err("not rounded").to_string().contains("not rounded"));
-    assert!(Embedding::from_json(&json.replacen("version\":1", "version\":2", 1), &tree).is_err());
+    assert!(Embedding::from_json(&json.replacen("version\":2", "version\":3", 1), &tree).is_err());
 
     let nodes = embedding.nodes_tsv(&tree);
     let lines: Vec<&str> = nodes.lines().collect();
@@ -244,7 +254,7 @@ fn json_and_tables() {
     }
     let compare = MethodRow::to_tsv(&embedding.methods);
     let lines: Vec<&str> = compare.lines().collect();
-    assert_eq!(lines.len(), 5);
+    assert_eq!(lines.len(), embedding.methods.len() + 1);
     assert_eq!(lines[0].split('\t').count(), 16);
     assert!(lines[4].starts_with("pso 24x8 n\t0\t"));
 }

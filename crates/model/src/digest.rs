@@ -1,4 +1,4 @@
-//! What tells one tree from another.
+//! What tells one tree, or one set of targets, from another.
 //!
 //! **Input** a tree. **Output** its digest: BLAKE3 of its canonical bytes, 64 hexadecimal digits.
 //! **Canonical bytes** all little-endian: the number of nodes (u64); then for each node in preorder its parent
@@ -6,7 +6,29 @@
 //! **Guarantees** trees that are equal by `==` have one digest; any other number in any node gives another one.
 //! **Cost** O(N).
 
+use crate::embedding::Targets;
 use crate::tree::Tree;
+
+/// The one NaN that stands for any.
+const NAN_BITS: u64 = 0x7ff8_0000_0000_0000;
+
+impl Targets {
+    /// The digest of the targets: BLAKE3 over their kind's name, the number of nodes (u64), then the angles, lengths,
+    /// headings and confidences of all nodes, bit for bit (f64, −0 as 0, any NaN as one; all little-endian).
+    #[must_use]
+    pub fn digest(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(self.kind.name().as_bytes());
+        hasher.update(&(self.angle_rad.len() as u64).to_le_bytes());
+        for column in [&self.angle_rad, &self.length_mm, &self.heading_rad, &self.confidence] {
+            for &number in column {
+                let bits = if number.is_nan() { NAN_BITS } else { (number + 0.0).to_bits() };
+                hasher.update(&bits.to_le_bytes());
+            }
+        }
+        hasher.finalize().to_hex().to_string()
+    }
+}
 
 impl Tree {
     /// The digest of the tree: 64 hexadecimal digits of BLAKE3 over its nodes, bit for bit.

@@ -1,8 +1,14 @@
 //! A tree laid flat.
 
+mod comparison;
 mod file;
+mod losses;
 
 use glam::DVec2;
+
+pub use comparison::{CompareCell, CompareColumn, ComparedLayout, Comparison, compare_columns};
+pub use file::NODE_COLUMNS;
+pub use losses::{Better, LossColumn, Losses};
 
 /// Where target angles come from (section 3.2.1 of [Hu2022]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -78,31 +84,6 @@ impl Energy {
     pub fn total(&self) -> f64 {
         self.length + self.angle + self.side + self.placement + self.crossing
     }
-}
-
-/// What a layout loses (section 5.1.1 of [Hu2022], and more). Means are over nodes that have the quantity.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Losses {
-    /// Metric 1: mean of |l − l_e| / l.
-    pub length_loss_mean: f64,
-    /// Metric 1: maximum of |l − l_e| / l.
-    pub length_loss_max: f64,
-    /// Metric 1: mean of |θ − θ_e| / θ against the targets.
-    pub angle_loss_mean: f64,
-    /// Metric 1: maximum of |θ − θ_e| / θ.
-    pub angle_loss_max: f64,
-    /// Metric 2: mean of |φ − φ_e| / φ, φ the interior angle in three dimensions, guarded at 5°.
-    pub angle3d_loss_mean: f64,
-    /// Metric 2: maximum.
-    pub angle3d_loss_max: f64,
-    /// Mean of |φ − φ_e| in degrees.
-    pub angle3d_error_mean_deg: f64,
-    /// Maximum of |φ − φ_e| in degrees.
-    pub angle3d_error_max_deg: f64,
-    /// Kruskal stress of node distances, plane against space.
-    pub stress: f64,
-    /// Spearman rank correlation of node distances, plane against space.
-    pub spearman: f64,
 }
 
 /// The statement that an embedding has no crossings, or where it has them: exact, over the written coordinates.

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use crate::FileError;
+use crate::table::{Column, Table, fixed};
 
 /// What was done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -65,6 +66,18 @@ pub struct LedgerEntry {
     pub reason: String,
 }
 
+/// The columns of `topology.tsv`.
+pub const LEDGER_COLUMNS: [Column; 8] = [
+    Column::new("entry", "n/a", "index of the entry, in the order in which things were done"),
+    Column::new("kind", "n/a", "what was done"),
+    Column::new("x_mm", "mm", "where, in space, RAS+: towards the right"),
+    Column::new("y_mm", "mm", "where: towards the front"),
+    Column::new("z_mm", "mm", "where: upwards"),
+    Column::new("radius_mm", "mm", "the radius there"),
+    Column::new("length_mm", "mm", "the length concerned, such as that of a pruned spur"),
+    Column::new("reason", "n/a", "why, with the numbers that decided"),
+];
+
 /// The topology ledger of a run, in the order in which things were done.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ledger(pub Vec<LedgerEntry>);
@@ -93,26 +106,17 @@ impl Ledger {
     /// The table `topology.tsv`.
     #[must_use]
     pub fn to_tsv(&self) -> String {
-        let mut table = crate::table::Table::new(&[
-            "entry",
-            "kind",
-            "x_mm",
-            "y_mm",
-            "z_mm",
-            "radius_mm",
-            "length_mm",
-            "reason",
-        ]);
+        let mut table = Table::with(&LEDGER_COLUMNS);
         for (entry_idx, entry) in self.0.iter().enumerate() {
             let p = entry.position_mm;
             table.row(&[
                 &entry_idx,
                 &entry.kind.name(),
-                &crate::table::fixed(p.x, 4),
-                &crate::table::fixed(p.y, 4),
-                &crate::table::fixed(p.z, 4),
-                &crate::table::fixed(entry.radius_mm, 4),
-                &crate::table::fixed(entry.length_mm, 4),
+                &fixed(p.x, 4),
+                &fixed(p.y, 4),
+                &fixed(p.z, 4),
+                &fixed(entry.radius_mm, 4),
+                &fixed(entry.length_mm, 4),
                 &entry.reason,
             ]);
         }

@@ -37,14 +37,16 @@ mod volume;
 
 pub use diagnose::Diagnose;
 pub use embedding::{
-    Certificate, Embedding, Energy, Losses, MethodRow, Pose, TargetKind, Targets, Termination, TracePoint,
+    Better, Certificate, CompareCell, CompareColumn, ComparedLayout, Comparison, Embedding, Energy,
+    LossColumn, Losses, MethodRow, NODE_COLUMNS, Pose, TargetKind, Targets, Termination, TracePoint,
+    compare_columns,
 };
 pub use grid::{Grid, GridError};
-pub use ledger::{Ledger, LedgerEntry, LedgerKind};
+pub use ledger::{LEDGER_COLUMNS, Ledger, LedgerEntry, LedgerKind};
 pub use mask::Mask;
 pub use report::{Count, Report, Warning};
 pub use skeleton::Skeleton;
-pub use spheres::{InscribedSpheres, Sphere};
+pub use spheres::{InscribedSpheres, SPHERE_COLUMNS, Sphere};
 pub use tree::{Branch, Branches, Node, Tree, TreeError};
 pub use versioned::FileError;
 pub use views::{LocalPlane, SubtreeView, View, ViewHierarchy};

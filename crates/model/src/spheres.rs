@@ -3,12 +3,35 @@
 use glam::DVec3;
 
 use crate::FileError;
-use crate::table::Table;
+use crate::table::{Column, Table};
 
 const FORMAT: &str = "espalier-spheres";
 const VERSION: u32 = 1;
-const COLUMNS: [&str; 8] =
-    ["sphere", "x_mm", "y_mm", "z_mm", "radius_mm", "distance_mm", "area_radius_mm", "is_cut"];
+
+/// The columns of `spheres.tsv`.
+pub const SPHERE_COLUMNS: [Column; 8] = [
+    Column::new("sphere", "n/a", "index of the sphere: that of its skeleton voxel"),
+    Column::new("x_mm", "mm", "centre in space, RAS+: towards the right"),
+    Column::new("y_mm", "mm", "centre: towards the front"),
+    Column::new("z_mm", "mm", "centre: upwards"),
+    Column::new("radius_mm", "mm", "radius of the largest sphere inside of the mask"),
+    Column::new("distance_mm", "mm", "distance from the voxel's own centre to the nearest background centre"),
+    Column::new("area_radius_mm", "mm", "radius of the circle with the area of the cross-section"),
+    Column::new(
+        "is_cut",
+        "n/a",
+        "1 if the border of the scan cuts the sphere, so that its radius is a lower bound",
+    ),
+];
+const COLUMNS: [&str; 8] = {
+    let mut names = [""; 8];
+    let mut column = 0;
+    while column < names.len() {
+        names[column] = SPHERE_COLUMNS[column].name;
+        column += 1;
+    }
+    names
+};
 
 /// The largest sphere inside the mask about a skeleton voxel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +60,7 @@ impl InscribedSpheres {
     /// or 1. Points are RAS+ mm.
     #[must_use]
     pub fn to_tsv(&self) -> String {
-        let mut table = Table::new(&COLUMNS);
+        let mut table = Table::with(&SPHERE_COLUMNS);
         for (sphere_idx, sphere) in self.0.iter().enumerate() {
             let area_radius = Some(sphere.area_radius_mm).filter(|radius| !radius.is_nan());
             table.row(&[

@@ -2,6 +2,57 @@
 
 use std::fmt::{Display, Write as _};
 
+/// What a column of a table holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Column {
+    /// Its name, with the unit at its end where it has a common one.
+    pub name: &'static str,
+    /// Its unit: `mm`, `deg`, `1` for a pure number, `n/a` for names and indices.
+    pub unit: &'static str,
+    /// What it is.
+    pub meaning: &'static str,
+}
+
+impl Column {
+    /// A column.
+    #[must_use]
+    pub const fn new(name: &'static str, unit: &'static str, meaning: &'static str) -> Self {
+        Self { name, unit, meaning }
+    }
+}
+
+/// How a number is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Digits {
+    /// With so many decimals.
+    Decimals(usize),
+    /// With so many significant digits, without an exponent.
+    Significant(usize),
+}
+
+impl Digits {
+    /// The text of a number.
+    #[must_use]
+    pub fn text(self, value: f64) -> String {
+        match self {
+            Self::Decimals(decimals) => fixed(value, decimals),
+            Self::Significant(digits) => significant(value, digits),
+        }
+    }
+}
+
+/// A data dictionary: the columns of tables, each table by its file's name.
+#[must_use]
+pub fn dictionary(tables: &[(&str, &[Column])]) -> String {
+    let mut dictionary = Table::new(&["table", "column", "unit", "meaning"]);
+    for (table, columns) in tables {
+        for column in *columns {
+            dictionary.row(&[table, &column.name, &column.unit, &column.meaning]);
+        }
+    }
+    dictionary.into_string()
+}
+
 /// A tab-separated table under construction.
 #[derive(Clone, Debug)]
 pub struct Table {
@@ -14,6 +65,13 @@ impl Table {
     #[must_use]
     pub fn new(columns: &[&str]) -> Self {
         Self { text: columns.join("\t") + "\n", n_columns: columns.len() }
+    }
+
+    /// An empty table with these columns.
+    #[must_use]
+    pub fn with(columns: &[Column]) -> Self {
+        let names: Vec<&str> = columns.iter().map(|column| column.name).collect();
+        Self::new(&names)
     }
 
     /// Adds a row. Tabs and line breaks inside a cell become spaces.
@@ -37,6 +95,15 @@ impl Table {
         self.text.push('\n');
     }
 
+    /// Adds a row of texts.
+    ///
+    /// # Panics
+    /// As [`Table::row`].
+    pub fn row_of(&mut self, cells: &[String]) {
+        let cells: Vec<&dyn Display> = cells.iter().map(|cell| cell as &dyn Display).collect();
+        self.row(&cells);
+    }
+
     /// The finished table.
     #[must_use]
     pub fn into_string(self) -> String {
@@ -57,9 +124,36 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
+/// A number with `digits` significant digits and no exponent: the decimals follow from its size.
+#[must_use]
+pub fn significant(value: f64, digits: usize) -> String {
+    if !value.is_finite() || value == 0.0 {
+        return fixed(value, 0);
+    }
+    let magnitude = espalier_geom::math::floor(espalier_geom::math::log10(value.abs())) as i64;
+    let decimals = digits as i64 - 1 - magnitude;
+    fixed(value, usize::try_from(decimals).unwrap_or(0))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn significant_digits() {
+        for (value, expected) in
+            [(0.0, "0"), (1234.567, "1235"), (0.001_234_56, "0.001235"), (-2.0, "-2.000"), (f64::NAN, "n/a")]
+        {
+            assert_eq!(significant(value, 4), expected);
+        }
+    }
+
+    #[test]
+    fn a_dictionary_names_table_and_unit() {
+        let columns = [Column::new("u_mm", "mm", "to the right")];
+        let text = dictionary(&[("nodes.tsv", &columns)]);
+        assert_eq!(text, "table\tcolumn\tunit\tmeaning\nnodes.tsv\tu_mm\tmm\tto the right\n");
+    }
 
     #[test]
     fn cells_cannot_break_the_table() {

@@ -8,7 +8,8 @@ use std::sync::Arc;
 
 use espalier_model::swc::{self, Traced};
 use espalier_model::{
-    Diagnose, Embedding, InscribedSpheres, Ledger, Mask, Report, Skeleton, Tree, ViewHierarchy, Volume,
+    Comparison, Diagnose, Embedding, InscribedSpheres, Ledger, Mask, Report, Skeleton, Tree, ViewHierarchy,
+    Volume,
 };
 
 use crate::config::{Input, Unit};
@@ -46,6 +47,7 @@ pub(crate) struct Artifacts {
     pub(crate) is_of_scan: bool,
     pub(crate) views: Option<Arc<ViewHierarchy>>,
     pub(crate) embedding: Option<Arc<Embedding>>,
+    pub(crate) comparison: Option<Arc<Comparison>>,
 }
 
 /// Where an artifact is looked for, and for whom.

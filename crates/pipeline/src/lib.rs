@@ -8,7 +8,8 @@
 //! | what each stage does with them | `steps` |
 //! | the loop over the stages | [`run`](mod@run) |
 //! | the run folder: atomic files, digests, one lock | `folder` |
-//! | how a result came about | `provenance` |
+//! | how a result came about, what each method cost | `provenance`, `methods` |
+//! | what the columns of the tables mean | `dictionary` |
 //!
 //! **Architecture Invariant:** a stage is handed what its predecessor *wrote*, as it would be read back: a run
 //! that starts in the middle gives the same bytes as one that starts at the beginning.
@@ -18,9 +19,11 @@
 mod artifacts;
 mod clock;
 pub mod config;
+mod dictionary;
 mod error;
 mod event;
 mod folder;
+mod methods;
 mod phantom;
 mod provenance;
 pub mod run;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use espalier_model::Report;
-use espalier_model::table::Table;
+use espalier_model::table::{Column, Table};
 use serde::Serialize;
 
 use crate::clock;
@@ -17,7 +17,35 @@ pub(crate) struct StageCost {
     pub(crate) stage: Stage,
     pub(crate) seconds: f64,
     pub(crate) peak_mb: Option<f64>,
+    /// The same of its parts, where it has any.
+    pub(crate) parts: Vec<PartCost>,
 }
+
+/// What one part of a stage cost, such as a layout method.
+pub(crate) struct PartCost {
+    pub(crate) name: String,
+    pub(crate) seconds: f64,
+    pub(crate) peak_mb: Option<f64>,
+}
+
+/// The columns of `provenance/inputs.tsv`.
+pub(crate) const INPUT_COLUMNS: [Column; 3] = [
+    Column::new("role", "n/a", "what the file is for"),
+    Column::new("bytes", "byte", "its size"),
+    Column::new("sha256", "n/a", "the SHA-256 of its content"),
+];
+
+/// The columns of `provenance/timings.tsv`.
+pub(crate) const TIMING_COLUMNS: [Column; 4] = [
+    Column::new("stage", "n/a", "the stage"),
+    Column::new("method", "n/a", "the layout method as in compare.tsv; n/a for the stage as a whole"),
+    Column::new("seconds", "s", "wall time"),
+    Column::new(
+        "peak_mb",
+        "MB",
+        "the most memory that the program has held until then, not only in this row",
+    ),
+];
 
 const INPUTS_FILE: &str = "provenance/inputs.tsv";
 const RUN_FILE: &str = "provenance/run.json";
@@ -48,7 +76,7 @@ pub(crate) fn is_other_input(folder: &RunFolder, input: &Path) -> Result<bool, E
 }
 
 fn inputs_tsv(input: Option<&Path>) -> Result<String, Error> {
-    let mut table = Table::new(&["role", "bytes", "sha256"]);
+    let mut table = Table::with(&INPUT_COLUMNS);
     if let Some(path) = input {
         let (n_bytes, digest) =
             file_digest(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
@@ -97,10 +125,13 @@ pub(crate) fn write_run(
     let json = serde_json::to_string_pretty(&record).unwrap_or_default() + "\n";
     folder.write_aside(RUN_FILE, json.as_bytes())?;
     // The peak is of the whole program until the end of the stage: the system keeps no other.
-    let mut table = Table::new(&["stage", "seconds", "peak_mb"]);
+    let mut table = Table::with(&TIMING_COLUMNS);
     for cost in costs {
-        let peak_mb = cost.peak_mb.map_or_else(|| "n/a".to_owned(), |mb| format!("{mb:.0}"));
-        table.row(&[&cost.stage, &format!("{:.3}", cost.seconds), &peak_mb]);
+        let parts = cost.parts.iter().map(|part| (part.name.as_str(), part.seconds, part.peak_mb));
+        for (method, seconds, peak_mb) in parts.chain([("n/a", cost.seconds, cost.peak_mb)]) {
+            let peak_mb = peak_mb.map_or_else(|| "n/a".to_owned(), |mb| format!("{mb:.0}"));
+            table.row(&[&cost.stage, &method, &format!("{seconds:.3}"), &peak_mb]);
+        }
     }
     folder.write_aside("provenance/timings.tsv", table.into_string().as_bytes())
 }

@@ -118,7 +118,9 @@ impl Run<'_> {
             events(Event::Started { stage });
             let watch = Stopwatch::start();
             let (source, artifacts) = (&self.source, &mut self.artifacts);
-            let outcome = steps::perform(&mut Step { stage, config, source, artifacts, events, folder })?;
+            let mut step = Step { stage, config, source, artifacts, events, folder, parts: Vec::new() };
+            let outcome = steps::perform(&mut step)?;
+            let parts = step.parts;
 
             if Some(&stage) == stages.first() {
                 self.clear_away(folder, &settings)?;
@@ -129,7 +131,8 @@ impl Run<'_> {
             write_outcome(folder, stage, &outcome)?;
             settings.adopt(folder, stage)?;
             let digest = folder.seal()?;
-            let cost = StageCost { stage, seconds: watch.seconds(), peak_mb: provenance::peak_memory_mb() };
+            let peak_mb = provenance::peak_memory_mb();
+            let cost = StageCost { stage, seconds: watch.seconds(), peak_mb, parts };
             let seconds = cost.seconds;
             self.costs.push(cost);
             provenance::write_run(folder, config, input, &self.costs, &digest)?;

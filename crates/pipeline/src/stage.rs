@@ -42,6 +42,8 @@ pub enum Artifact {
     Views,
     /// A planar embedding.
     Embedding,
+    /// The layouts of all methods.
+    Comparison,
 }
 
 impl Stage {
@@ -110,7 +112,14 @@ impl Stage {
             Self::Radius => &["radius.nii.gz", "spheres.tsv"],
             Self::Tree => &["/tree.swc", "/topology.tsv"],
             Self::Views => &["/views.json"],
-            Self::Embed => &["/embedding.json", "/nodes.tsv", "/compare.tsv", "convergence.tsv"],
+            Self::Embed => &[
+                "/embedding.json",
+                "/nodes.tsv",
+                "/compare.tsv",
+                "/compare.json",
+                "/dictionary.tsv",
+                "convergence.tsv",
+            ],
             Self::Render => &["/planar.png", "/planar.svg", "/planar.exr", "/global-view.png"],
         };
         let folder = self.folder();
@@ -142,6 +151,7 @@ impl Artifact {
             Self::Tree => "tree.swc",
             Self::Views => "views.json",
             Self::Embedding => "embedding.json",
+            Self::Comparison => "compare.json",
         }
     }
 
@@ -157,6 +167,7 @@ impl Artifact {
             Self::Tree => "tree",
             Self::Views => "view hierarchy",
             Self::Embedding => "embedding",
+            Self::Comparison => "comparison of methods",
         }
     }
 }

@@ -5,19 +5,22 @@ use std::path::Path;
 use std::sync::Arc;
 
 use espalier_embed::PoseMode;
-use espalier_model::table::{Table, fixed};
+use espalier_model::table::{Column, Table, fixed};
 use espalier_model::{
-    Embedding, Grid, GridError, InscribedSpheres, Ledger, Mask, MethodRow, Report, Tree, ViewHierarchy,
-    nifti_out, swc,
+    Comparison, Embedding, Grid, GridError, InscribedSpheres, Ledger, Mask, MethodRow, Report, Tree,
+    ViewHierarchy, nifti_out, swc,
 };
 use espalier_render::Compass;
 
 use crate::artifacts::{Artifacts, Lookup, SOURCE_KEY, SOURCE_SCAN, SOURCE_TRACING};
 use crate::config::{Config, Source};
+use crate::dictionary;
 use crate::error::Error;
 use crate::event::Event;
 use crate::folder::RunFolder;
+use crate::methods::MethodWatch;
 use crate::phantom;
+use crate::provenance::PartCost;
 use crate::run::boxed;
 use crate::stage::{Artifact, Stage};
 
@@ -36,6 +39,8 @@ pub(crate) struct Step<'a> {
     pub(crate) artifacts: &'a mut Artifacts,
     pub(crate) events: &'a (dyn Fn(Event) + Sync),
     pub(crate) folder: &'a RunFolder,
+    /// What parts of the stage have cost, filled in while it is done.
+    pub(crate) parts: Vec<PartCost>,
 }
 
 /// Does a stage.
@@ -212,26 +217,29 @@ fn views(step: &mut Step<'_>) -> Result<Outcome, Error> {
 fn embed(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let tree = step.take(Artifacts::tree)?;
     let views = step.take(Artifacts::views)?;
-    let (events, stage) = (step.events, step.stage);
-    let progress = move |p: espalier_embed::Progress| {
-        let note = format!("energy {:.4}, crossings {}", p.energy, p.crossings);
-        events(Event::Progress { stage, done: p.done, total: p.total, note });
-    };
     let mut params = step.config.embed.clone();
     if params.pose == PoseMode::Auto {
         params.pose = if step.artifacts.is_of_scan { PoseMode::View } else { PoseMode::RootOnTop };
     }
-    let embedded = espalier_embed::embed(&tree, &views, &params, step.config.seed, &progress)
-        .map_err(|error| step.failed(error))?;
+    let watch = MethodWatch::new(step.stage, step.events);
+    let embedded =
+        espalier_embed::embed(&tree, &views, &params, step.config.seed, &|event| watch.hear(event))
+            .map_err(|error| step.failed(error))?;
+    step.parts = watch.into_costs();
     let json = embedded.embedding.to_json();
     let embedding = step.read_back(&json, |text| Embedding::from_json(text, &tree))?;
+    let compared_json = embedded.comparison.to_json();
+    let comparison = step.read_back(&compared_json, |text| Comparison::from_json(text, &tree))?;
     let line = embedding_phrase(&embedding);
     let files = vec![
         ("nodes.tsv".to_owned(), embedding.nodes_tsv(&tree).into_bytes()),
         ("compare.tsv".to_owned(), MethodRow::to_tsv(&embedding.methods).into_bytes()),
+        ("dictionary.tsv".to_owned(), dictionary::text().into_bytes()),
         step.beside("convergence.tsv", convergence_tsv(&embedding).into_bytes()),
         step.place(Artifact::Embedding, json.into_bytes()),
+        step.place(Artifact::Comparison, compared_json.into_bytes()),
     ];
+    step.artifacts.comparison = Some(Arc::new(comparison));
     step.artifacts.embedding = Some(Arc::new(embedding));
     Ok(Outcome { files, report: embedded.report, line })
 }
@@ -368,9 +376,17 @@ fn embedding_phrase(embedding: &Embedding) -> String {
     )
 }
 
+/// The columns of `convergence.tsv`.
+pub(crate) const CONVERGENCE_COLUMNS: [Column; 4] = [
+    Column::new("iteration", "1", "iteration of the optimiser; 0 is the start"),
+    Column::new("evaluations", "1", "evaluations of the energy so far"),
+    Column::new("energy", "1", "the best energy so far"),
+    Column::new("crossings", "pairs", "the crossings of that best"),
+];
+
 /// The convergence curve: best energy and its crossings by iteration.
 fn convergence_tsv(embedding: &Embedding) -> String {
-    let mut table = Table::new(&["iteration", "evaluations", "energy", "crossings"]);
+    let mut table = Table::with(&CONVERGENCE_COLUMNS);
     for point in &embedding.trace {
         table.row(&[&point.iteration, &point.evaluations, &fixed(point.energy, 9), &point.crossings]);
     }

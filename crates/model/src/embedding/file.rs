@@ -1,4 +1,4 @@
-//! The files of an embedding: `embedding.json`, `nodes.tsv`, `compare.tsv`.
+//! The files of an embedding: `embedding.json` and `nodes.tsv`.
 //!
 //! JSON holds every number with the digits that read back to the same bits. The tables are for people and
 //! spreadsheets: coordinates with the decimals of the embedding's quantum, everything else as its column says.
@@ -6,15 +6,36 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Certificate, Embedding, Energy, Losses, MethodRow, Pose, TargetKind, Targets, Termination, TracePoint,
-};
-use crate::table::{Table, fixed};
+use super::losses::LossesFile;
+use super::{Certificate, Embedding, Energy, MethodRow, Pose, TargetKind, Targets, Termination, TracePoint};
+use crate::table::{Column, Table, fixed};
 use crate::tree::Tree;
 use crate::versioned::{self, FileError};
 
 const FORMAT: &str = "espalier-embedding";
-const VERSION: u32 = 1;
+/// 2: more losses.
+const VERSION: u32 = 2;
+
+/// The columns of `nodes.tsv`.
+pub const NODE_COLUMNS: [Column; 13] = [
+    Column::new("node", "n/a", "index of the node in preorder; 0 is the root"),
+    Column::new("parent", "n/a", "index of its parent; n/a for the root"),
+    Column::new("x_mm", "mm", "position in space, RAS+: towards the right"),
+    Column::new("y_mm", "mm", "position in space: towards the front"),
+    Column::new("z_mm", "mm", "position in space: upwards"),
+    Column::new("radius_mm", "mm", "radius of the tube at the node"),
+    Column::new("u_mm", "mm", "position in the picture's plane: to the right"),
+    Column::new("v_mm", "mm", "position in the picture's plane: up"),
+    Column::new("branch", "n/a", "index of its branch; n/a for the root"),
+    Column::new("generation", "1", "forks between the root and its branch"),
+    Column::new(
+        "target_angle_deg",
+        "deg",
+        "target angle, counter-clockwise from its grandparent's side; 180 = straight",
+    ),
+    Column::new("length_ratio", "1", "drawn length over target length, minus 1"),
+    Column::new("angle_ratio", "1", "r_a of equation 3: 0 = as the target, 1 = straight"),
+];
 
 impl TargetKind {
     /// The name used in files.
@@ -71,21 +92,7 @@ impl Embedding {
     pub fn nodes_tsv(&self, tree: &Tree) -> String {
         let branches = tree.branches();
         let decimals = self.decimals();
-        let mut table = Table::new(&[
-            "node",
-            "parent",
-            "x_mm",
-            "y_mm",
-            "z_mm",
-            "radius_mm",
-            "u_mm",
-            "v_mm",
-            "branch",
-            "generation",
-            "target_angle_deg",
-            "length_ratio",
-            "angle_ratio",
-        ]);
+        let mut table = Table::with(&NODE_COLUMNS);
         for (node, (data, flat)) in tree.nodes().iter().zip(&self.positions_mm).enumerate() {
             let branch = branches.of_node(node);
             let or_none = |value: Option<String>| value.unwrap_or_else(|| "n/a".to_owned());
@@ -103,53 +110,6 @@ impl Embedding {
                 &fixed(self.targets.angle_rad[node].to_degrees(), 6),
                 &fixed(self.length_ratio[node], 9),
                 &fixed(self.angle_ratio[node], 9),
-            ]);
-        }
-        table.into_string()
-    }
-}
-
-impl MethodRow {
-    /// The table `compare.tsv`: one row per method.
-    #[must_use]
-    pub fn to_tsv(rows: &[Self]) -> String {
-        let mut table = Table::new(&[
-            "method",
-            "crossings",
-            "overlaps",
-            "energy",
-            "length_loss_mean",
-            "length_loss_max",
-            "angle_loss_mean",
-            "angle_loss_max",
-            "angle3d_loss_mean",
-            "angle3d_loss_max",
-            "angle3d_error_mean_deg",
-            "angle3d_error_max_deg",
-            "stress",
-            "spearman",
-            "evaluations",
-            "targets",
-        ]);
-        for row in rows {
-            let losses = &row.losses;
-            table.row(&[
-                &row.method,
-                &row.crossings,
-                &row.overlaps,
-                &fixed(row.energy.total(), 6),
-                &fixed(losses.length_loss_mean, 6),
-                &fixed(losses.length_loss_max, 6),
-                &fixed(losses.angle_loss_mean, 6),
-                &fixed(losses.angle_loss_max, 6),
-                &fixed(losses.angle3d_loss_mean, 6),
-                &fixed(losses.angle3d_loss_max, 6),
-                &fixed(losses.angle3d_error_mean_deg, 4),
-                &fixed(losses.angle3d_error_max_deg, 4),
-                &fixed(losses.stress, 6),
-                &fixed(losses.spearman, 6),
-                &row.evaluations,
-                &row.targets.name(),
             ]);
         }
         table.into_string()
@@ -221,21 +181,6 @@ struct EnergyFile {
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct LossesFile {
-    length_loss_mean: f64,
-    length_loss_max: f64,
-    angle_loss_mean: f64,
-    angle_loss_max: f64,
-    angle3d_loss_mean: f64,
-    angle3d_loss_max: f64,
-    angle3d_error_mean_deg: f64,
-    angle3d_error_max_deg: f64,
-    stress: f64,
-    spearman: f64,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 struct CertificateFile {
     crossings: usize,
     pairs: Vec<(usize, usize)>,
@@ -259,7 +204,7 @@ struct TracePointFile {
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct MethodRowFile {
+pub(super) struct MethodRowFile {
     method: String,
     crossings: usize,
     overlaps: usize,
@@ -286,23 +231,28 @@ fn check(file: &EmbeddingFile, n_nodes: usize) -> Result<(), String> {
     if let Some(node) = angle_rad.iter().skip(1).position(Option::is_none) {
         return Err(format!("targets.angle_rad has no angle for node {}", node + 1));
     }
-    let flat: Vec<f64> = file.positions_mm.iter().flatten().copied().collect();
-    check_column("positions_mm", &flat, 2 * n_nodes)?;
-
-    let n_decimals = decimals(file.quantum_mm);
-    if !(file.quantum_mm > 0.0 && format!("1e-{n_decimals}").parse() == Ok(file.quantum_mm)) {
-        return Err(format!("quantum_mm is {}, which is no power of ten up to 1", file.quantum_mm));
-    }
-    let is_rounded = |&value: &f64| format!("{value:.n_decimals$}").parse() == Ok(value);
-    if let Some(place) = flat.iter().position(|value| !is_rounded(value)) {
-        return Err(format!("positions_mm of node {} are not rounded to {}", place / 2, file.quantum_mm));
-    }
+    check_positions(&file.positions_mm, file.quantum_mm, n_nodes)?;
     let is_edge = |edge: usize| (1..n_nodes).contains(&edge);
     match file.certificate.pairs.iter().find(|&&(a, b)| !is_edge(a) || !is_edge(b)) {
         Some(pair) => Err(format!("certificate.pairs names edges {pair:?} of a tree of {n_nodes} nodes")),
         None if file.certificate.pairs.len() > file.certificate.crossings => {
             Err(format!("certificate.pairs are more than the {} crossings", file.certificate.crossings))
         }
+        None => Ok(()),
+    }
+}
+
+/// Checks that there is one position per node, finite and rounded.
+pub(super) fn check_positions(positions: &[[f64; 2]], quantum_mm: f64, n_nodes: usize) -> Result<(), String> {
+    let flat = positions.as_flattened();
+    check_column("positions_mm", flat, 2 * n_nodes)?;
+    let n_decimals = decimals(quantum_mm);
+    if !(quantum_mm > 0.0 && format!("1e-{n_decimals}").parse() == Ok(quantum_mm)) {
+        return Err(format!("quantum_mm is {quantum_mm}, which is no power of ten up to 1"));
+    }
+    let is_rounded = |&value: &f64| format!("{value:.n_decimals$}").parse() == Ok(value);
+    match flat.iter().position(|value| !is_rounded(value)) {
+        Some(place) => Err(format!("positions_mm of node {} are not rounded to {quantum_mm}", place / 2)),
         None => Ok(()),
     }
 }
@@ -392,6 +342,12 @@ impl From<TargetsFile> for Targets {
     }
 }
 
+impl MethodRowFile {
+    pub(super) fn method(&self) -> &str {
+        &self.method
+    }
+}
+
 impl From<&MethodRow> for MethodRowFile {
     fn from(row: &MethodRow) -> Self {
         Self {
@@ -456,21 +412,6 @@ macro_rules! same_variants {
 
 same_fields!(Energy, EnergyFile { length, angle, side, placement, crossing });
 same_fields!(TracePoint, TracePointFile { iteration, evaluations, energy, crossings });
-same_fields!(
-    Losses,
-    LossesFile {
-        length_loss_mean,
-        length_loss_max,
-        angle_loss_mean,
-        angle_loss_max,
-        angle3d_loss_mean,
-        angle3d_loss_max,
-        angle3d_error_mean_deg,
-        angle3d_error_max_deg,
-        stress,
-        spearman,
-    }
-);
 same_variants!(TargetKind, TargetKindFile { Intrinsic, Projected, IntrinsicMirrored, ProjectedMirrored });
 same_variants!(Termination, TerminationFile { Constructed, Optimal, BudgetSpent });
 
@@ -479,6 +420,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
+    use crate::Losses;
     use crate::diagnose::Diagnose;
     use crate::tree::Node;
 

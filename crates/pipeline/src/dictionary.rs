@@ -1,0 +1,24 @@
+//! The data dictionary of a run folder: every table, every column, its unit and its meaning.
+//!
+//! Each table declares its columns once, where it is made; this is where they are put together.
+
+use espalier_model::table::{Column, dictionary};
+use espalier_model::{LEDGER_COLUMNS, NODE_COLUMNS, SPHERE_COLUMNS, compare_columns};
+
+use crate::provenance::{INPUT_COLUMNS, TIMING_COLUMNS};
+use crate::steps::CONVERGENCE_COLUMNS;
+
+/// The text of `dictionary.tsv`.
+pub(crate) fn text() -> String {
+    let compare: Vec<Column> = compare_columns().iter().map(|column| column.column).collect();
+    dictionary(&[
+        ("compare.tsv", &compare),
+        ("nodes.tsv", &NODE_COLUMNS),
+        ("topology.tsv", &LEDGER_COLUMNS),
+        ("spheres.tsv", &SPHERE_COLUMNS),
+        ("dropped.tsv", &LEDGER_COLUMNS),
+        ("convergence.tsv", &CONVERGENCE_COLUMNS),
+        ("provenance/inputs.tsv", &INPUT_COLUMNS),
+        ("provenance/timings.tsv", &TIMING_COLUMNS),
+    ])
+}
