@@ -10,7 +10,7 @@ use espalier_embed::{
     certify, embed,
 };
 use espalier_model::diagnose::{Class, Diagnose};
-use espalier_model::{Comparison, Embedding, MethodRow, Termination, Tree};
+use espalier_model::{Comparison, Embedding, MethodRow, Termination, Tree, compare_columns};
 use glam::{DVec2, DVec3};
 
 fn with_pso(pso: PsoParams) -> Params {
@@ -255,7 +255,7 @@ fn json_and_tables() {
     let compare = MethodRow::to_tsv(&embedding.methods);
     let lines: Vec<&str> = compare.lines().collect();
     assert_eq!(lines.len(), embedding.methods.len() + 1);
-    assert_eq!(lines[0].split('\t').count(), 16);
+    assert_eq!(lines[0].split('\t').count(), compare_columns().len());
     assert!(lines[4].starts_with("pso 24x8 n\t0\t"));
 }
 
