@@ -157,6 +157,7 @@ pub(crate) fn select(
         termination,
         trace,
         methods,
+        edits: Vec::new(),
     };
     Ok(Embedded { embedding, comparison, report })
 }

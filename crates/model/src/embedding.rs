@@ -10,6 +10,8 @@ pub use comparison::{CompareCell, CompareColumn, ComparedLayout, Comparison, com
 pub use file::NODE_COLUMNS;
 pub use losses::{Better, LossColumn, Losses};
 
+use crate::edits::Edit;
+
 /// Where target angles come from (section 3.2.1 of [Hu2022]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TargetKind {
@@ -160,6 +162,24 @@ pub struct MethodRow {
     pub targets: TargetKind,
 }
 
+/// A manual edit and what came of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EditRecord {
+    /// What was asked for.
+    pub edit: Edit,
+    /// By how much the branch is turned in the end, in degrees counter-clockwise in the picture: as asked, up to
+    /// the rounding of coordinates.
+    pub angle_reached_deg: f64,
+    /// Crossings that the edit brought about.
+    pub crossings_introduced: usize,
+    /// How many of them were removed before the next edit.
+    pub crossings_removed: usize,
+    /// The total energy before the edit.
+    pub energy_before: f64,
+    /// The total energy when the rest had been optimised around it.
+    pub energy_after: f64,
+}
+
 /// A tree laid flat.
 ///
 /// **Guarantees** one entry per node of its tree in every per-node vector; positions are finite and rounded to
@@ -196,4 +216,6 @@ pub struct Embedding {
     pub trace: Vec<TracePoint>,
     /// All methods that ran, scored alike, this one among them.
     pub methods: Vec<MethodRow>,
+    /// The manual edits that were made after them, in order; none as a rule.
+    pub edits: Vec<EditRecord>,
 }

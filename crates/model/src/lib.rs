@@ -10,6 +10,7 @@
 //! | [`Tree`] | `tree` | `views`, `embed`, `render` | `tree.swc` |
 //! | [`Ledger`] | `tree` | the reader | `topology.tsv` |
 //! | [`ViewHierarchy`] | `views` | `embed`, `render` | `views.json` |
+//! | [`Edits`] | the user | `embed` | `edits.json` |
 //! | [`Embedding`] | `embed` | `render` | `embedding.json` |
 //! | [`Report`] | every stage | the reader | `report.json` |
 //!
@@ -20,6 +21,7 @@
 
 pub mod diagnose;
 mod digest;
+mod edits;
 mod embedding;
 mod grid;
 mod ledger;
@@ -36,9 +38,10 @@ mod views;
 mod volume;
 
 pub use diagnose::Diagnose;
+pub use edits::{Edit, EditError, Edits};
 pub use embedding::{
-    Better, Certificate, CompareCell, CompareColumn, ComparedLayout, Comparison, Embedding, Energy,
-    LossColumn, Losses, MethodRow, NODE_COLUMNS, Pose, TargetKind, Targets, Termination, TracePoint,
+    Better, Certificate, CompareCell, CompareColumn, ComparedLayout, Comparison, EditRecord, Embedding,
+    Energy, LossColumn, Losses, MethodRow, NODE_COLUMNS, Pose, TargetKind, Targets, Termination, TracePoint,
     compare_columns,
 };
 pub use grid::{Grid, GridError};

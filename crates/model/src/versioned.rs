@@ -70,6 +70,11 @@ impl Diagnose for FileError {
             Self::OtherTree { .. } => {
                 "take the tree that the file was made for, or make the file again for this tree"
             }
+            Self::Malformed { format, .. } | Self::Unknown { format, .. } | Self::Invalid { format, .. }
+                if *format == crate::edits::FORMAT =>
+            {
+                "pipelines/README.md shows such a file; nodes.tsv has the numbers of branches and nodes"
+            }
             _ => "write the file again with this version of espalier: run the stage that makes it",
         }
         .to_owned()
@@ -113,6 +118,14 @@ pub(crate) fn from_json<T: DeserializeOwned>(
     version: u32,
     text: &str,
 ) -> Result<T, FileError> {
+    check_head(format, version, text)?;
+    let malformed = |source| FileError::Malformed { format, source };
+    let envelope: Envelope<T> = serde_json::from_str(text).map_err(malformed)?;
+    Ok(envelope.body)
+}
+
+/// Whether a JSON text is of the expected format and version.
+pub(crate) fn check_head(format: &'static str, version: u32, text: &str) -> Result<(), FileError> {
     let malformed = |source| FileError::Malformed { format, source };
     let head: EnvelopeHead = serde_json::from_str(text).map_err(malformed)?;
     if head.format != format || head.version != version {
@@ -123,6 +136,5 @@ pub(crate) fn from_json<T: DeserializeOwned>(
             found_version: head.version,
         });
     }
-    let envelope: Envelope<T> = serde_json::from_str(text).map_err(malformed)?;
-    Ok(envelope.body)
+    Ok(())
 }

@@ -150,7 +150,7 @@ fn kinds() {
 fn parameters_are_checked() {
     let key = |text: &str| {
         let params: Params = toml::from_str(text).unwrap_or_else(|error| panic!("{text}: {error}"));
-        params.validate().map_or_else(|error| error.key, |()| "")
+        params.validate().map_or_else(|error| error.key, |()| "".into())
     };
     let cases = [
         ("", ""),

@@ -7,7 +7,10 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::losses::LossesFile;
-use super::{Certificate, Embedding, Energy, MethodRow, Pose, TargetKind, Targets, Termination, TracePoint};
+use super::{
+    Certificate, EditRecord, Embedding, Energy, MethodRow, Pose, TargetKind, Targets, Termination, TracePoint,
+};
+use crate::edits::Edit;
 use crate::table::{Column, Table, fixed};
 use crate::tree::Tree;
 use crate::versioned::{self, FileError};
@@ -135,6 +138,7 @@ struct EmbeddingFile {
     energy: EnergyFile,
     losses: LossesFile,
     methods: Vec<MethodRowFile>,
+    edits: Vec<EditRecordFile>,
     trace: Vec<TracePointFile>,
     positions_mm: Vec<[f64; 2]>,
     length_ratio: Vec<f64>,
@@ -204,6 +208,19 @@ struct TracePointFile {
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+struct EditRecordFile {
+    branch: usize,
+    node: usize,
+    angle_asked_deg: f64,
+    angle_reached_deg: f64,
+    crossings_introduced: usize,
+    crossings_removed: usize,
+    energy_before: f64,
+    energy_after: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct MethodRowFile {
     method: String,
     crossings: usize,
@@ -232,6 +249,10 @@ fn check(file: &EmbeddingFile, n_nodes: usize) -> Result<(), String> {
         return Err(format!("targets.angle_rad has no angle for node {}", node + 1));
     }
     check_positions(&file.positions_mm, file.quantum_mm, n_nodes)?;
+    let is_there = |edit: &EditRecordFile| edit.branch.max(edit.node) < n_nodes.saturating_sub(1);
+    if let Some(idx) = file.edits.iter().position(|edit| !is_there(edit)) {
+        return Err(format!("edits[{idx}] names a branch or a node that the tree does not have"));
+    }
     let is_edge = |edge: usize| (1..n_nodes).contains(&edge);
     match file.certificate.pairs.iter().find(|&&(a, b)| !is_edge(a) || !is_edge(b)) {
         Some(pair) => Err(format!("certificate.pairs names edges {pair:?} of a tree of {n_nodes} nodes")),
@@ -287,6 +308,7 @@ impl From<&Embedding> for EmbeddingFile {
             energy: embedding.energy.into(),
             losses: embedding.losses.into(),
             methods: embedding.methods.iter().map(Into::into).collect(),
+            edits: embedding.edits.iter().map(Into::into).collect(),
             trace: embedding.trace.iter().copied().map(Into::into).collect(),
             positions_mm: embedding.positions_mm.iter().map(DVec2::to_array).collect(),
             length_ratio: embedding.length_ratio.clone(),
@@ -313,6 +335,7 @@ impl From<EmbeddingFile> for Embedding {
             termination: file.termination.into(),
             trace: file.trace.into_iter().map(Into::into).collect(),
             methods: file.methods.into_iter().map(Into::into).collect(),
+            edits: file.edits.into_iter().map(Into::into).collect(),
         }
     }
 }
@@ -372,6 +395,34 @@ impl From<MethodRowFile> for MethodRow {
             losses: file.losses.into(),
             evaluations: file.evaluations,
             targets: file.targets.into(),
+        }
+    }
+}
+
+impl From<&EditRecord> for EditRecordFile {
+    fn from(record: &EditRecord) -> Self {
+        Self {
+            branch: record.edit.branch,
+            node: record.edit.node,
+            angle_asked_deg: record.edit.angle_deg,
+            angle_reached_deg: record.angle_reached_deg,
+            crossings_introduced: record.crossings_introduced,
+            crossings_removed: record.crossings_removed,
+            energy_before: record.energy_before,
+            energy_after: record.energy_after,
+        }
+    }
+}
+
+impl From<EditRecordFile> for EditRecord {
+    fn from(file: EditRecordFile) -> Self {
+        Self {
+            edit: Edit { branch: file.branch, node: file.node, angle_deg: file.angle_asked_deg },
+            angle_reached_deg: file.angle_reached_deg,
+            crossings_introduced: file.crossings_introduced,
+            crossings_removed: file.crossings_removed,
+            energy_before: file.energy_before,
+            energy_after: file.energy_after,
         }
     }
 }
@@ -458,6 +509,14 @@ mod tests {
             termination: Termination::BudgetSpent,
             trace: vec![TracePoint { iteration: 0, evaluations: 1, energy: 0.3, crossings: 0 }],
             methods: vec![row],
+            edits: vec![EditRecord {
+                edit: Edit { branch: 0, node: 0, angle_deg: 1.0 / 3.0 },
+                angle_reached_deg: 0.333,
+                crossings_introduced: 2,
+                crossings_removed: 2,
+                energy_before: 0.1,
+                energy_after: 0.3,
+            }],
         };
         (tree, embedding)
     }
@@ -471,6 +530,7 @@ mod tests {
         assert_eq!(back.targets.angle_rad[1].to_bits(), embedding.targets.angle_rad[1].to_bits());
         assert_eq!(back.to_json(), embedding.to_json());
         assert_eq!(back.methods, embedding.methods);
+        assert_eq!(back.edits, embedding.edits);
     }
 
     #[test]

@@ -49,6 +49,7 @@ pub(crate) fn flat(tree: &Tree) -> Embedding {
         termination: Termination::Constructed,
         trace: Vec::new(),
         methods: Vec::new(),
+        edits: Vec::new(),
     }
 }
 
