@@ -51,6 +51,8 @@ pub enum Method {
     Radial,
     /// Nested cones that keep the side of every turn.
     Cone,
+    /// The radial layout bent back towards one view: [Marino2015], reconstructed.
+    Marino,
     /// The paper's particle swarm.
     Pso,
     /// Ours: mirror search, untangling, coordinate descent and a barrier method in turn.
@@ -66,6 +68,7 @@ impl Method {
             Self::Projection => "projection",
             Self::Radial => "radial",
             Self::Cone => "cone",
+            Self::Marino => "marino",
             Self::Pso => "pso",
             Self::Solver => "solver",
         }
@@ -75,6 +78,38 @@ impl Method {
     #[must_use]
     pub fn is_optimiser(self) -> bool {
         matches!(self, Self::Pso | Self::Solver)
+    }
+}
+
+/// The view towards which `marino` bends the radial layout. The anatomical ones are for RAS+, as radiologists see them:
+/// the patient's right, or front, is on the viewer's left.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MarinoView {
+    /// The best global view.
+    #[default]
+    Auto,
+    /// From the front.
+    Coronal,
+    /// From the left.
+    Sagittal,
+    /// From the feet.
+    Axial,
+    /// From `towards_camera`, with `up` upwards.
+    Towards,
+}
+
+impl MarinoView {
+    /// The name used in the config and in tables.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Coronal => "coronal",
+            Self::Sagittal => "sagittal",
+            Self::Axial => "axial",
+            Self::Towards => "towards",
+        }
     }
 }
 

@@ -16,7 +16,7 @@ use crate::problem::Problem;
 /// Edges in a run: eight single-precision borders are one or two vector registers.
 const RUN: usize = 8;
 /// The tolerance as a share of the median edge length, and the least angle between siblings in rad.
-const TOLERANCE: f64 = 1e-6;
+pub(crate) const TOLERANCE: f64 = 1e-6;
 /// Two units in the last place of single precision, by which a border is moved outwards.
 const OUTWARDS: f32 = 2.4e-7;
 
@@ -204,7 +204,7 @@ impl Check<'_> {
         let edge_a = [self.x[parent_a], self.y[parent_a], self.x[a], self.y[a]];
         let edge_b = [self.x[parent_b], self.y[parent_b], self.x[b], self.y[b]];
         if parent_a == parent_b {
-            siblings_overlap(edge_a, edge_b)
+            neighbours_overlap(edge_a, edge_b)
         } else {
             segments_meet(edge_a, edge_b, self.tolerance)
         }
@@ -219,14 +219,14 @@ fn grown(a: f64, b: f64) -> (f32, f32) {
 }
 
 /// Whether two edges from one hub point the same way to within the tolerance.
-fn siblings_overlap([hub_x, hub_y, ax, ay]: [f64; 4], [_, _, bx, by]: [f64; 4]) -> bool {
+pub(crate) fn neighbours_overlap([hub_x, hub_y, ax, ay]: [f64; 4], [_, _, bx, by]: [f64; 4]) -> bool {
     let (ux, uy, vx, vy) = (ax - hub_x, ay - hub_y, bx - hub_x, by - hub_y);
     let (cross, dot) = (ux * vy - uy * vx, ux * vx + uy * vy);
     dot >= 0.0 && cross.abs() <= TOLERANCE * dot
 }
 
 /// Whether two segments cross or come nearer than the tolerance.
-fn segments_meet(s: [f64; 4], t: [f64; 4], tolerance: f64) -> bool {
+pub(crate) fn segments_meet(s: [f64; 4], t: [f64; 4], tolerance: f64) -> bool {
     let (t_from, t_to, t_margin) = sides(s, t, tolerance);
     if (t_from > t_margin && t_to > t_margin) || (t_from < -t_margin && t_to < -t_margin) {
         return false;

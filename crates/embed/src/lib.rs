@@ -4,7 +4,7 @@
 //! |--:|---|---|
 //! | 1 | `targets`, `siblings` | target angles, lengths and headings from the tree and its views |
 //! | 2 | `problem`, `weights`, `ratio` | the frozen problem; the user's weights; equation 3 between angles and ratios |
-//! | 3 | `layout/…` | the methods: `projection`, `radial`, `cone`, `pso` (with `start`) |
+//! | 3 | `layout/…` | the methods: `projection`, `radial`, `cone`, `marino`, `pso` (with `start`) |
 //! | 4 | `batch`, `crossing` | the swarm's energy, many particles at once, and its strict crossing count |
 //! | 5 | `pose` | one rigid motion of the whole, mirrored or not; rounding to what is written |
 //! | 6 | `certify`, `overlap` | the exact certificate; overlaps of the drawn tubes |
@@ -49,9 +49,9 @@ mod weights;
 use espalier_model::{Comparison, Embedding, Report, Tree, ViewHierarchy};
 
 pub use certify::certify;
-pub use choices::{CrossingWeight, Freedom, Method, PoseMode, Pull, Start, TargetMode};
+pub use choices::{CrossingWeight, Freedom, MarinoView, Method, PoseMode, Pull, Start, TargetMode};
 pub use error::Error;
-pub use params::{Params, PsoParams, SolverParams, WeightRule};
+pub use params::{MarinoParams, Params, PsoParams, SolverParams, WeightRule};
 
 /// How far the swarm is.
 #[derive(Clone, Copy, Debug, PartialEq)]

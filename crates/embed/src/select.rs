@@ -18,7 +18,7 @@ use crate::choices::{Method, PoseMode};
 use crate::distances::SpaceDistances;
 use crate::energy::{self, Scored};
 use crate::error::Error;
-use crate::layout::{Layout, cone, projection, pso, radial};
+use crate::layout::{Layout, cone, marino, projection, pso, radial};
 use crate::params::Params;
 use crate::pose::{self, Posed};
 use crate::problem::Problem;
@@ -50,6 +50,10 @@ pub(crate) fn run_methods(
         cone = cone::headings(problem);
         placed("cone", &cone)
     })?);
+    if wants(Method::Marino) {
+        let marino = || Ok(marino::layout(problem, views, &params.marino));
+        layouts.push(announced(events, Method::Marino, marino)?);
+    }
     if wants(Method::Pso) {
         let progress = |progress| events(Event::Searching(progress));
         let swarm = || pso::layout(problem, (&radial, &cone), (&params.pso, seed), &progress);

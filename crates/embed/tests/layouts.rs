@@ -6,8 +6,8 @@ mod common;
 
 use common::{random_tree, tree_of, views_along};
 use espalier_embed::{
-    CrossingWeight, Embedded, Error, Freedom, Method, Params, PoseMode, PsoParams, Pull, Start, TargetMode,
-    certify, embed,
+    CrossingWeight, Embedded, Error, Freedom, MarinoParams, Method, Params, PoseMode, PsoParams, Pull, Start,
+    TargetMode, certify, embed,
 };
 use espalier_model::diagnose::{Class, Diagnose};
 use espalier_model::{Comparison, Embedding, MethodRow, Termination, Tree, compare_columns};
@@ -15,6 +15,10 @@ use glam::{DVec2, DVec3};
 
 fn with_pso(pso: PsoParams) -> Params {
     Params { pso, ..Params::default() }
+}
+
+fn with_marino(towards_camera: [f64; 3], up: [f64; 3]) -> Params {
+    Params { marino: MarinoParams { towards_camera, up, ..MarinoParams::default() }, ..Params::default() }
 }
 
 fn small() -> Params {
@@ -71,7 +75,7 @@ fn planar_trees_come_out_exactly() {
     let mut n_planar = 0;
     for key in 0..200 {
         let tree = random_tree(key as usize % 8, 4 + key as usize % 12, 1.0, true, key);
-        let embedded = laid_flat(&tree, &small());
+        let embedded = laid_flat(&tree, &Params { method: Method::Pso, ..small() });
         let embedding = &embedded.embedding;
         let projection = &embedding.methods[0];
         if projection.crossings > 0 || !has_wide_angles(&tree) {
@@ -132,7 +136,8 @@ fn same_bytes_for_any_number_of_threads() {
 fn the_seed_matters_and_is_kept() {
     let tree = random_tree(0, 120, 1.0, false, 5);
     let views = views_along(&tree, DVec3::Z);
-    let with_seed = |seed: u64| embed(&tree, &views, &small(), seed, &|_| {}).expect("a layout").embedding;
+    let params = Params { method: Method::Pso, methods: Vec::new(), ..small() };
+    let with_seed = |seed: u64| embed(&tree, &views, &params, seed, &|_| {}).expect("a layout").embedding;
     let (one, other) = (with_seed(1), with_seed(2));
     assert_eq!((one.seed, other.seed), (1, 2));
     assert_ne!(one.positions_mm, other.positions_mm);
@@ -256,7 +261,8 @@ fn json_and_tables() {
     let lines: Vec<&str> = compare.lines().collect();
     assert_eq!(lines.len(), embedding.methods.len() + 1);
     assert_eq!(lines[0].split('\t').count(), compare_columns().len());
-    assert!(lines[4].starts_with("pso 24x8 n\t0\t"));
+    assert!(lines[4].starts_with("marino\t0\t"), "{compare}");
+    assert!(lines[5].starts_with("pso 24x8 n\t0\t"), "{compare}");
 }
 
 #[test]
@@ -280,6 +286,9 @@ fn bad_input_is_named() {
         (with_pso(PsoParams { omega_g: -0.1, ..small().pso }), "pso.omega_g"),
         (Params { w_crossing: CrossingWeight::Fixed(0.0), ..small() }, "w_crossing"),
         (with_pso(PsoParams { memory_mib: 0, ..small().pso }), "pso.memory_mib"),
+        (with_marino([0.0; 3], [0.0, 0.0, 1.0]), "marino.towards_camera"),
+        (with_marino([0.0, 1.0, 0.0], [0.0, f64::NAN, 1.0]), "marino.up"),
+        (with_marino([0.0, 1.0, 0.0], [0.0, -2.0, 0.0]), "marino.up"),
     ] {
         let error = error_of(params);
         assert_eq!(error.class(), Class::Usage);

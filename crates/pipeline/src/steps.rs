@@ -7,8 +7,8 @@ use std::sync::Arc;
 use espalier_embed::PoseMode;
 use espalier_model::table::{Column, Table, fixed};
 use espalier_model::{
-    Comparison, Embedding, Grid, GridError, InscribedSpheres, Ledger, Mask, MethodRow, Report, Tree,
-    ViewHierarchy, nifti_out, swc,
+    Comparison, Embedding, Grid, GridError, InscribedSpheres, Ledger, Mask, MethodRow, Report, Termination,
+    Tree, ViewHierarchy, nifti_out, swc,
 };
 use espalier_render::Compass;
 
@@ -361,15 +361,20 @@ fn ledger_phrase(ledger: &Ledger) -> String {
 fn embedding_phrase(embedding: &Embedding) -> String {
     let certificate = &embedding.certificate;
     let verdict = if certificate.holds() { "certified" } else { "not planar" };
-    let others: Vec<String> = embedding
+    let is_optimal = embedding.termination == Termination::Optimal;
+    let optimal = if is_optimal { ", proven optimal" } else { "" };
+    // The published baselines; `compare.tsv` has all.
+    let is_baseline = |row: &MethodRow| row.method.starts_with("marino") || row.method == "radial";
+    let mut others: Vec<String> = embedding
         .methods
         .iter()
-        .filter(|row| row.method != embedding.method && row.crossings == 0)
+        .filter(|row| is_baseline(row) && row.method != embedding.method && row.crossings == 0)
         .map(|row| format!("{} {:.1}°", row.method, row.losses.angle3d_error_mean_deg))
         .collect();
+    others.sort();
     let others = if others.is_empty() { String::new() } else { format!("  ({})", others.join(", ")) };
     format!(
-        "crossings {} ({verdict})  length loss {:.1} %  angle loss {:.1}°{others}",
+        "crossings {} ({verdict}{optimal})  length loss {:.1} %  angle loss {:.1}°{others}",
         certificate.crossings,
         100.0 * embedding.losses.length_loss_mean,
         embedding.losses.angle3d_error_mean_deg,

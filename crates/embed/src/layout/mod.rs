@@ -5,9 +5,11 @@
 //! | `projection` | the best global view as it is | as many as there are |
 //! | `radial` | equal angle per tip | none |
 //! | `cone` | nested convex cones that keep sides | none, for any lengths |
+//! | `marino` | radial, bent back towards one view: the baseline of [Marino2015] | none |
 //! | `pso`, with `start`, `step` | the paper's particle swarm, Algorithm 1 | none, or the incumbent wins |
 
 pub(crate) mod cone;
+pub(crate) mod marino;
 pub(crate) mod projection;
 pub(crate) mod pso;
 pub(crate) mod radial;

@@ -15,6 +15,11 @@ use crate::problem::Problem;
 
 /// The heading of each edge; 0 for the root.
 pub(crate) fn headings(problem: &Problem) -> Vec<f64> {
+    headings_in_order(problem, |node| problem.children_by_target(node))
+}
+
+/// The heading of each edge, with the children of each node in an order that is given.
+pub(crate) fn headings_in_order(problem: &Problem, children: impl Fn(usize) -> Vec<usize>) -> Vec<f64> {
     let n_nodes = problem.n_nodes();
     let n_tips = problem.n_tips_below();
     let share_rad = TAU / f64::from(n_tips[0]);
@@ -23,7 +28,7 @@ pub(crate) fn headings(problem: &Problem) -> Vec<f64> {
     let mut first_tip = vec![0_u32; n_nodes];
     for node in 0..n_nodes {
         let mut tip = first_tip[node];
-        for child in problem.children_by_target(node) {
+        for child in children(node) {
             first_tip[child] = tip;
             heading_rad[child] = (f64::from(tip) + 0.5 * f64::from(n_tips[child])) * share_rad - PI;
             tip += n_tips[child];

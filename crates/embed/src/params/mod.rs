@@ -1,5 +1,6 @@
 //! The parameters of the stage: `[embed]` in the config.
 
+mod marino;
 mod pso;
 mod solver;
 mod weights;
@@ -9,6 +10,7 @@ use std::borrow::Cow;
 use espalier_model::diagnose::ParamError;
 use serde::{Deserialize, Serialize};
 
+pub use marino::MarinoParams;
 pub use pso::PsoParams;
 pub use solver::SolverParams;
 pub use weights::WeightRule;
@@ -58,6 +60,8 @@ pub struct Params {
     pub solver: SolverParams,
     /// `[embed.pso]`: the paper's particle swarm.
     pub pso: PsoParams,
+    /// `[embed.marino]`: the baseline of one view.
+    pub marino: MarinoParams,
 }
 
 impl Default for Params {
@@ -65,7 +69,14 @@ impl Default for Params {
         Self {
             targets: TargetMode::Intrinsic,
             method: Method::Solver,
-            methods: vec![Method::Projection, Method::Radial, Method::Cone, Method::Pso, Method::Solver],
+            methods: vec![
+                Method::Projection,
+                Method::Radial,
+                Method::Cone,
+                Method::Marino,
+                Method::Pso,
+                Method::Solver,
+            ],
             pose: PoseMode::Auto,
             w_length: 2.0,
             w_angle: 2.0,
@@ -75,6 +86,7 @@ impl Default for Params {
             weights: Vec::new(),
             solver: SolverParams::default(),
             pso: PsoParams::default(),
+            marino: MarinoParams::default(),
         }
     }
 }
@@ -116,7 +128,8 @@ impl Params {
         }
         self.weights.iter().enumerate().try_for_each(|(idx, rule)| rule.validate(idx))?;
         self.solver.validate()?;
-        self.pso.validate()
+        self.pso.validate()?;
+        self.marino.validate()
     }
 }
 

@@ -19,6 +19,7 @@ use crate::layout::Layout;
 use crate::params::Params;
 use crate::problem::Problem;
 pub(crate) use shape::Shape;
+pub(crate) use work::Work;
 
 /// Lays the problem's tree flat; `cone` are the headings of the cone start.
 pub(crate) fn layout(problem: &Problem, cone: &[f64], _params: &Params) -> Layout {
