@@ -49,20 +49,42 @@ impl Separation {
 
     /// Whether two different edges meet.
     pub(crate) fn meet(&self, problem: &Problem, positions: &[DVec2], a: usize, b: usize) -> bool {
-        if let Some(is_folded) = neighbours_fold(problem, positions, a, b) {
-            return is_folded;
-        }
-        let (s, t) = (segment(problem, positions, a), segment(problem, positions, b));
-        segment_distance(&s, &t) < self.tolerance_mm
+        self.meet_at(problem, (a, b), &[segment(problem, positions, a), segment(problem, positions, b)])
     }
 
     /// Whether two different edges meet or are too near.
     pub(crate) fn too_near(&self, problem: &Problem, positions: &[DVec2], a: usize, b: usize) -> bool {
-        if let Some(is_folded) = neighbours_fold(problem, positions, a, b) {
-            return is_folded;
+        let places = [segment(problem, positions, a), segment(problem, positions, b)];
+        neighbours_fold(problem, (a, b), &places)
+            .unwrap_or_else(|| segment_distance(&places[0], &places[1]) < self.required_mm(a, b))
+    }
+
+    /// Whether two different edges meet where they are put, each from its parent to its node.
+    pub(crate) fn meet_at(&self, problem: &Problem, (a, b): (usize, usize), places: &[Segment; 2]) -> bool {
+        neighbours_fold(problem, (a, b), places)
+            .unwrap_or_else(|| segment_distance(&places[0], &places[1]) < self.tolerance_mm)
+    }
+
+    /// Whether two different edges may go from where they are to other places: they are far enough apart there, or
+    /// they did not meet before and come no nearer.
+    pub(crate) fn may_move(
+        &self,
+        problem: &Problem,
+        (a, b): (usize, usize),
+        before: &[Segment; 2],
+        after: &[Segment; 2],
+    ) -> bool {
+        if let Some(is_folded) = neighbours_fold(problem, (a, b), after) {
+            return !is_folded;
         }
-        let (s, t) = (segment(problem, positions, a), segment(problem, positions, b));
-        segment_distance(&s, &t) < self.required_mm(a, b)
+        let distance_mm = segment_distance(&after[0], &after[1]);
+        if distance_mm < self.tolerance_mm {
+            return false;
+        }
+        let is_far = distance_mm >= self.clearance_mm || distance_mm >= self.required_mm(a, b);
+        // Rounding is no approach.
+        let near_mm = self.tolerance_mm..=distance_mm * (1.0 + 1e-9);
+        is_far || near_mm.contains(&segment_distance(&before[0], &before[1]))
     }
 }
 
@@ -72,19 +94,21 @@ pub(crate) fn segment(problem: &Problem, positions: &[DVec2], edge: usize) -> Se
 }
 
 /// For edges with a common node: whether they lie on each other.
-fn neighbours_fold(problem: &Problem, positions: &[DVec2], a: usize, b: usize) -> Option<bool> {
-    let (first, last) = (a.min(b), a.max(b));
-    let (parent_first, parent_last) = (problem.parent[first] as usize, problem.parent[last] as usize);
-    let (hub, other) = if parent_last == first {
-        (first, parent_first)
-    } else if parent_last == parent_first {
-        (parent_first, first)
+fn neighbours_fold(problem: &Problem, (a, b): (usize, usize), places: &[Segment; 2]) -> Option<bool> {
+    let [place_a, place_b] = places;
+    let ((first, place_first), (last, place_last)) =
+        if a < b { ((a, place_a), (b, place_b)) } else { ((b, place_b), (a, place_a)) };
+    let parent_last = problem.parent[last] as usize;
+    let to_first = if parent_last == first {
+        place_first.a - place_first.b
+    } else if parent_last == problem.parent[first] as usize {
+        place_first.b - place_first.a
     } else {
         return None;
     };
-    let (to_other, to_last) = (positions[other] - positions[hub], positions[last] - positions[hub]);
-    let is_ahead = to_other.dot(to_last) > 0.0;
+    let to_last = place_last.b - place_last.a;
+    let is_ahead = to_first.dot(to_last) > 0.0;
     // sin of the angle between them; the lengths are positive unless the edges have none.
-    let across = to_other.perp_dot(to_last).abs();
-    Some(is_ahead && across <= TOLERANCE * to_other.length() * to_last.length() || to_last == DVec2::ZERO)
+    let across = to_first.perp_dot(to_last).abs();
+    Some(is_ahead && across <= TOLERANCE * to_first.length() * to_last.length() || to_last == DVec2::ZERO)
 }

@@ -3,7 +3,11 @@
 //! | file | what |
 //! |---|---|
 //! | `shape` | a layout by its ratios |
+//! | `untangling` | a start: the targets themselves, untangled from the tips to the root |
+//! | `descent` | ratios towards 0, a few at a time |
 //! | `barrier/…` | all ratios at once, under a barrier |
+//! | `linkage`, `joint`, `deviation` | a layout as a linkage: what a change of some ratios moves, gains and hits |
+//! | `hierarchy`, `similarity` | boxes over subtrees that move as a whole |
 //! | `grid` | edges by cells: who may be near whom |
 //! | `work` | the budget |
 //!
@@ -11,8 +15,17 @@
 //! **Source** ours; the energy is Eq. 4 of [Hu2022].
 
 mod barrier;
+#[cfg(test)]
+mod checks;
+mod descent;
+mod deviation;
 mod grid;
+mod hierarchy;
+mod joint;
+mod linkage;
 mod shape;
+mod similarity;
+mod untangling;
 mod work;
 
 use crate::layout::Layout;

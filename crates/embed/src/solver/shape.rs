@@ -13,7 +13,7 @@ use crate::problem::Problem;
 use crate::ratio;
 
 /// A layout by its ratios.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Shape {
     /// r_l of each segment, in [−0.97, 1].
     pub(crate) length_ratio: Vec<f64>,
@@ -31,10 +31,14 @@ impl Shape {
     }
 
     /// Exact lengths and given headings, which keep the sides of the targets.
+    ///
+    /// No edge is folded onto its parent's; children of the root have none to be folded onto.
     pub(crate) fn from_headings(problem: &Problem, heading_rad: &[f64]) -> Self {
         let (low, high) = ratio::ANGLE_RANGE;
         let mut angle_ratio = place::angle_ratios(problem, heading_rad);
-        angle_ratio.iter_mut().for_each(|ratio| *ratio = ratio.clamp(low, high));
+        for (ratio, &parent) in angle_ratio.iter_mut().zip(&problem.parent) {
+            *ratio = ratio.clamp(if parent == 0 { -1.0 } else { low }, high);
+        }
         Self { angle_ratio, ..Self::targets(problem) }
     }
 

@@ -1,0 +1,290 @@
+//! Untangling from the tips to the root: from the targets themselves to a layout without crossings near them.
+//!
+//! **Input** the problem, the cone, the separation, a budget. **Output** a shape without crossings.
+//! **Notation** a *leg* is the path from one edge of a crossing pair up to where the paths of both part. A turn of any
+//! node on a leg moves the two edges against each other.
+//! **Steps** segments from the last to the first, so that all below a segment is untangled before it; only edges in
+//! its subtree count. While a pair crosses:
+//! 1. *Bend*: a run of nodes on a leg turns by an angle that they share; many runs and angles, the cheapest first,
+//!    until one leaves fewer crossings.
+//! 2. *Search* where none does: bends by chance, by the rule of Metropolis, through layouts with more crossings too.
+//! 3. *Blend* where that fails: ratios on the legs go a part of the way to those of the cone; then those of the
+//!    smaller child's subtree, of the fork's, at last of all below the segment. Of the shares tried the least that
+//!    leaves fewer crossings is made.
+//!
+//! A budget that is spent gives the cone.
+//! **Guarantees** no crossing where nothing is pinned: a subtree whose ratios are the cone's has none, and the last
+//! blend makes it so. Near the targets where they cross little. Pinned ratios stay.
+//! **Source** ours. **Cost** some hundred moves for each crossing met.
+
+use std::ops::Range;
+
+use espalier_geom::math;
+use espalier_geom::random::{Purpose, Stream};
+
+use super::deviation::{deviation, ratio_of, softness};
+use super::joint::Change;
+use super::linkage::{Linkage, Rule};
+use super::shape::Shape;
+use super::work::Work;
+use crate::problem::Problem;
+use crate::separation::Separation;
+
+/// How many nodes share a turn.
+const RUNS: [usize; 5] = [1, 4, 16, 64, 256];
+/// Where runs of one length are tried on a leg, at most.
+const MAX_PLACES: usize = 12;
+/// Turns that are tried, in rad, to both sides.
+const TURNS_RAD: [f64; 9] = [0.01, 0.025, 0.06, 0.13, 0.25, 0.5, 1.0, 1.8, 3.0];
+/// Crossing pairs of which bends are tried before a blend is made.
+const MAX_PAIRS: usize = 8;
+/// Shares of the way to the cone, in this order.
+const BLENDS: [f64; 5] = [0.05, 0.12, 0.3, 0.6, 1.0];
+
+/// The budget of a search, in looks for each edge that counts.
+const SEARCH_WORK: u64 = 20_000;
+/// Temperatures of a search, in loss.
+const T_START: f64 = 0.3;
+const T_END: f64 = 0.01;
+/// What a crossing costs in a search, in loss.
+const CROSSING_LOSS: f64 = 0.5;
+
+/// A shape without crossings near the targets; `cone` is the shape to fall back on.
+pub(crate) fn untangle(problem: &Problem, separation: &Separation, cone: &Shape, work: &mut Work) -> Shape {
+    let linkage = Linkage::new(problem, separation, Shape::targets(problem));
+    let mut untangling = Untangling {
+        problem,
+        cone,
+        linkage,
+        change: Change::default(),
+        obstacles: Vec::new(),
+        crossings: Vec::new(),
+        window: 0..0,
+        seed: 0,
+        n_searches: 0,
+    };
+    for segment in (0..problem.branches.list().len()).rev() {
+        untangling.untangle_segment(segment, work);
+        if work.is_spent() {
+            // What is left would be blended to the cone in ever larger parts.
+            return cone.clone();
+        }
+    }
+    untangling.untangle_root(work);
+    untangling.linkage.shape
+}
+
+struct Untangling<'a> {
+    problem: &'a Problem<'a>,
+    cone: &'a Shape,
+    linkage: Linkage<'a>,
+    change: Change,
+    obstacles: Vec<(u32, u32)>,
+    /// The pairs that cross, of the edges that count.
+    crossings: Vec<(u32, u32)>,
+    /// The edges that count.
+    window: Range<usize>,
+    seed: u64,
+    n_searches: u32,
+}
+
+impl Untangling<'_> {
+    fn untangle_segment(&mut self, segment: usize, work: &mut Work) {
+        let nodes = self.problem.branches.list()[segment].nodes.clone();
+        self.window = self.problem.tree.subtree(nodes.start);
+        let children = self.problem.tree.children(nodes.end - 1);
+        let starts = std::iter::once(nodes.start).chain(children.iter().copied());
+        self.crossings = self.linkage.crossings(&self.window, (starts, 1), work);
+        self.resolve(work);
+    }
+
+    fn untangle_root(&mut self, work: &mut Work) {
+        self.window = 1..self.problem.n_nodes();
+        let starts = self.problem.tree.children(0).iter().copied();
+        self.crossings = self.linkage.crossings(&self.window, (starts, 0), work);
+        self.resolve(work);
+    }
+
+    fn resolve(&mut self, work: &mut Work) {
+        while !self.crossings.is_empty() {
+            let has_bent = !work.is_spent() && self.bend(work);
+            if !has_bent && !self.anneal(work) && !self.blend(work) {
+                break;
+            }
+        }
+    }
+
+    /// Turns a run of nodes on a leg so that fewer pairs cross; whether any does.
+    fn bend(&mut self, work: &mut Work) -> bool {
+        for idx in 0..self.crossings.len().min(MAX_PAIRS) {
+            let (a, b) = self.crossings[idx];
+            let legs = self.legs(a as usize, b as usize);
+            let mut bends = Vec::new();
+            for (leg_idx, leg) in legs.iter().enumerate() {
+                for n_nodes in RUNS.into_iter().filter(|&n_nodes| n_nodes <= leg.len()) {
+                    let n_places = (leg.len() - n_nodes + 1).min(MAX_PLACES);
+                    for place in 0..n_places {
+                        let start = place * (leg.len() - n_nodes) / (n_places - 1).max(1);
+                        let run = &leg[start..start + n_nodes];
+                        for turn in TURNS_RAD.into_iter().flat_map(|turn| [turn, -turn]) {
+                            if self.set_bend(run, turn) {
+                                let loss = -self.linkage.gain(&self.change);
+                                bends.push((loss, leg_idx, start..start + n_nodes, turn));
+                            }
+                        }
+                    }
+                }
+            }
+            bends.sort_by(|a, b| a.0.total_cmp(&b.0));
+            for (_, leg, run, turn) in bends {
+                self.set_bend(&legs[leg][run], turn);
+                if self.make_if_fewer(Rule::Clearance, work) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    /// Searches for bends that leave no crossing, by chance and through worse layouts; whether they were found.
+    fn anneal(&mut self, work: &mut Work) -> bool {
+        let (shape, crossings) = (self.linkage.shape.clone(), self.crossings.clone());
+        self.n_searches += 1;
+        let mut stream = Stream::new(self.seed, Purpose::Untangling, self.n_searches, 0);
+        let limit = work.done + SEARCH_WORK * (self.window.len() as u64).max(200);
+        let start = work.done;
+        while !self.crossings.is_empty() && work.done < limit && !work.is_spent() {
+            let progress = (work.done - start) as f64 / (limit - start) as f64;
+            let temperature = T_START * math::pow(T_END / T_START, progress);
+            self.anneal_once(temperature, &mut stream, work);
+            work.spend(20);
+        }
+        if self.crossings.is_empty() {
+            return true;
+        }
+        self.linkage.set_shape(shape);
+        self.crossings = crossings;
+        false
+    }
+
+    fn anneal_once(&mut self, temperature: f64, stream: &mut Stream, work: &mut Work) {
+        let (a, b) = self.crossings[stream.below(self.crossings.len() as u32) as usize];
+        let legs = self.legs(a as usize, b as usize);
+        let leg = &legs[stream.below(2) as usize];
+        if leg.is_empty() {
+            return;
+        }
+        let n_nodes = math::pow(leg.len() as f64, stream.unit()) as usize;
+        let start = stream.below((leg.len() - n_nodes + 1) as u32) as usize;
+        let run = &leg[start..start + n_nodes];
+        let is_set = if stream.below(4) == 0 {
+            let share = stream.unit();
+            self.change.clear();
+            let ratios = run.iter().map(|&node| (node, share * self.linkage.shape.angle_ratio[node]));
+            self.change.angles.extend(ratios.filter(|&(_, ratio)| ratio != 0.0));
+            true
+        } else {
+            let size = math::pow(300.0, stream.unit()) * 0.01;
+            let turn = if stream.below(2) == 0 { size } else { -size };
+            self.set_bend(run, turn)
+        };
+        if !is_set {
+            return;
+        }
+        // The threshold first: a layout with more crossings than it allows is not counted to the end.
+        let loss = -self.linkage.gain(&self.change);
+        let allowed = (-temperature * math::ln(1.0 - stream.unit()) - loss) / CROSSING_LOSS;
+        let most = self.crossings.len() as f64 + allowed;
+        if most >= 0.0 {
+            self.make_if_at_most(Rule::Clearance, most as usize, work);
+        }
+    }
+
+    /// The nodes that turn one edge of a pair against the other, from each edge upwards.
+    fn legs(&self, a: usize, b: usize) -> [Vec<usize>; 2] {
+        let parting = self.linkage.parting(a, b);
+        let leg = |edge: usize| {
+            let above = |&node: &usize| Some(self.problem.parent[node] as usize);
+            std::iter::successors(Some(edge), above).take_while(|&node| node != parting).collect()
+        };
+        [leg(a), leg(b)]
+    }
+
+    /// The change by which nodes turn by an angle in all, each by its part; whether it is in range.
+    fn set_bend(&mut self, run: &[usize], turn_rad: f64) -> bool {
+        self.change.clear();
+        let problem = self.problem;
+        if run.iter().any(|&node| !problem.free_angle[node]) {
+            return false;
+        }
+        let all: f64 = run.iter().map(|&node| softness(problem, node, turn_rad)).sum();
+        for &node in run {
+            let old = deviation(problem, node, self.linkage.shape.angle_ratio[node]);
+            let new = old + turn_rad * (softness(problem, node, turn_rad) / all);
+            let Some(ratio) = ratio_of(problem, node, new) else { return false };
+            self.change.angles.push((node, ratio));
+        }
+        true
+    }
+
+    /// Goes a part of the way to the cone.
+    fn blend(&mut self, work: &mut Work) -> bool {
+        let mut on_legs: Vec<usize> = Vec::new();
+        for &(a, b) in &self.crossings {
+            on_legs.extend(self.legs(a as usize, b as usize).into_iter().flatten());
+        }
+        on_legs.sort_unstable();
+        on_legs.dedup();
+        let (a, b) = self.crossings[0];
+        let parting = self.linkage.parting(a as usize, b as usize);
+        let [first, second] = self.legs(a as usize, b as usize).map(|leg| leg.last().copied());
+        let smaller =
+            [first, second].into_iter().flatten().min_by_key(|&c| self.problem.tree.subtree(c).len());
+        let of_smaller = smaller.map_or(0..0, |child| self.problem.tree.subtree(child));
+        let of_fork = parting + 1..self.problem.tree.subtree(parting).end;
+        let sets = [on_legs, of_smaller.collect(), of_fork.collect(), self.window.clone().collect()];
+        for nodes in sets {
+            for share in BLENDS {
+                self.set_blend(&nodes, share);
+                if self.make_if_fewer(Rule::Crossings, work) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    fn set_blend(&mut self, nodes: &[usize], share: f64) {
+        self.change.clear();
+        for &node in nodes {
+            let (old, cone) = (self.linkage.shape.angle_ratio[node], self.cone.angle_ratio[node]);
+            // The cone's own bits at the end of the way, so that the last blend is the cone.
+            let ratio = if share < 1.0 { old + share * (cone - old) } else { cone };
+            if ratio != old && self.problem.free_angle[node] {
+                self.change.angles.push((node, ratio));
+            }
+        }
+    }
+
+    /// Makes the change if it leaves fewer crossings.
+    fn make_if_fewer(&mut self, rule: Rule, work: &mut Work) -> bool {
+        self.make_if_at_most(rule, self.crossings.len() - 1, work)
+    }
+
+    /// Makes the change if it leaves no more crossings than said.
+    fn make_if_at_most(&mut self, rule: Rule, most: usize, work: &mut Work) -> bool {
+        let limit = (&self.window, most);
+        self.linkage.obstacles((&self.change, rule), limit, &mut self.obstacles, work);
+        let linkage = &self.linkage;
+        let n_kept =
+            self.crossings.iter().filter(|&&(a, b)| !linkage.parts_pair(a as usize, b as usize)).count();
+        if n_kept + self.obstacles.len() > most {
+            return false;
+        }
+        self.crossings.retain(|&(a, b)| !linkage.parts_pair(a as usize, b as usize));
+        self.crossings.append(&mut self.obstacles);
+        self.crossings.sort_unstable();
+        self.linkage.make(&self.change);
+        true
+    }
+}
