@@ -16,10 +16,11 @@ use std::f64::consts::{PI, TAU};
 use espalier_geom::angle::wrap;
 use espalier_geom::math;
 use glam::DVec2;
+use rayon::prelude::*;
 
 use super::super::work::Work;
 use super::contact::{Contact, barrier};
-use super::pairs::{PairList, Spacing, are_apart};
+use super::pairs::{Pair, PairList, Spacing, are_apart};
 use crate::paths::Paths;
 use crate::problem::Problem;
 use crate::ratio;
@@ -39,6 +40,48 @@ pub(super) struct Value {
 /// The six sums from which the curvature by a rotation about any point follows, and by a shift along any line.
 type Moments = [f64; 6];
 
+/// Pairs that one thread takes at once.
+const PAIRS_PER_CHUNK: usize = 4096;
+
+/// What the barrier of one pair is, and does: its value, infinite where the edges meet, and its derivative by the
+/// first edge's nearest point.
+#[derive(Clone, Copy, Debug)]
+struct Push {
+    value: f64,
+    on_first: DVec2,
+    along_first: f64,
+    along_second: f64,
+}
+
+impl Push {
+    const NONE: Self = Self { value: 0.0, on_first: DVec2::ZERO, along_first: 0.0, along_second: 0.0 };
+
+    fn of(Pair { bounds, .. }: &Pair, (p, q): Ends) -> Self {
+        if are_apart(p, q, bounds.floor_mm + bounds.width_mm) {
+            return Self::NONE;
+        }
+        let contact = Contact::between(p, q);
+        let u = (contact.distance - bounds.floor_mm) / bounds.width_mm;
+        if u >= 1.0 {
+            return Self::NONE;
+        }
+        if u <= 0.0 {
+            return Self { value: f64::INFINITY, ..Self::NONE };
+        }
+        let (value, slope, _) = barrier(u);
+        let on_first = contact.normal * (slope / bounds.width_mm);
+        Self { value, on_first, along_first: contact.along_first, along_second: contact.along_second }
+    }
+}
+
+/// Both ends of both edges of a pair.
+type Ends = ((DVec2, DVec2), (DVec2, DVec2));
+
+fn ends(problem: &Problem, positions: &[DVec2], pair: &Pair) -> Ends {
+    let of = |edge: u32| (positions[problem.parent[edge as usize] as usize], positions[edge as usize]);
+    (of(pair.first), of(pair.second))
+}
+
 /// The energy as a function of the ratios.
 pub(super) struct Field<'a, S> {
     pub(super) problem: &'a Problem<'a>,
@@ -47,6 +90,7 @@ pub(super) struct Field<'a, S> {
     /// μ.
     strength: f64,
     pairs: PairList,
+    pushes: Vec<Push>,
     /// Pairs that met in the last evaluation.
     pub(super) met: Vec<(u32, u32)>,
     pub(super) positions: Vec<DVec2>,
@@ -73,6 +117,7 @@ impl<'a, S: Spacing> Field<'a, S> {
             spacing,
             strength,
             pairs: PairList::new(problem),
+            pushes: Vec::new(),
             met: Vec::new(),
             positions: vec![DVec2::ZERO; n_nodes],
             accepted: vec![DVec2::ZERO; n_nodes],
@@ -209,32 +254,28 @@ impl<'a, S: Spacing> Field<'a, S> {
 
     /// Σ b over the pairs, and the forces on their ends.
     fn push_apart(&mut self) -> f64 {
-        self.force.fill(DVec2::ZERO);
+        let Self { problem, pairs, pushes, positions, force, met, .. } = self;
+        pushes.resize(pairs.pairs.len(), Push::NONE);
+        let push_of = |pair: &Pair| Push::of(pair, ends(problem, positions, pair));
+        pushes.par_iter_mut().with_min_len(PAIRS_PER_CHUNK).zip(&pairs.pairs).for_each(|(push, pair)| {
+            *push = push_of(pair);
+        });
+        force.fill(DVec2::ZERO);
         let mut sum = 0.0;
-        let Self { problem, pairs, positions, force, met, .. } = self;
-        for pair in &pairs.pairs {
-            let (a, b) = (pair.first as usize, pair.second as usize);
-            let (parent_a, parent_b) = (problem.parent[a] as usize, problem.parent[b] as usize);
-            let (p, q) = ((positions[parent_a], positions[a]), (positions[parent_b], positions[b]));
-            if are_apart(p, q, pair.bounds.floor_mm + pair.bounds.width_mm) {
+        for (push, pair) in pushes.iter().zip(&pairs.pairs) {
+            if push.value == 0.0 {
                 continue;
             }
-            let contact = Contact::between(p, q);
-            let u = (contact.distance - pair.bounds.floor_mm) / pair.bounds.width_mm;
-            if u >= 1.0 {
-                continue;
-            }
-            if u <= 0.0 {
+            if push.value == f64::INFINITY {
                 met.push((pair.first, pair.second));
                 continue;
             }
-            let (value, slope, _) = barrier(u);
-            sum += value;
-            let push = contact.normal * (slope / pair.bounds.width_mm);
-            force[parent_a] += push * (1.0 - contact.along_first);
-            force[a] += push * contact.along_first;
-            force[parent_b] -= push * (1.0 - contact.along_second);
-            force[b] -= push * contact.along_second;
+            sum += push.value;
+            let (a, b) = (pair.first as usize, pair.second as usize);
+            force[problem.parent[a] as usize] += push.on_first * (1.0 - push.along_first);
+            force[a] += push.on_first * push.along_first;
+            force[problem.parent[b] as usize] -= push.on_first * (1.0 - push.along_second);
+            force[b] -= push.on_first * push.along_second;
         }
         sum
     }
@@ -294,8 +335,10 @@ impl<'a, S: Spacing> Field<'a, S> {
         let Self { problem, paths, pairs, positions, moments, .. } = self;
         for pair in &pairs.pairs {
             let (a, b) = (pair.first as usize, pair.second as usize);
-            let p = (positions[problem.parent[a] as usize], positions[a]);
-            let q = (positions[problem.parent[b] as usize], positions[b]);
+            let (p, q) = ends(problem, positions, pair);
+            if are_apart(p, q, pair.bounds.floor_mm + pair.bounds.width_mm) {
+                continue;
+            }
             let contact = Contact::between(p, q);
             let u = (contact.distance - pair.bounds.floor_mm) / pair.bounds.width_mm;
             if u <= 0.0 || u >= 1.0 {

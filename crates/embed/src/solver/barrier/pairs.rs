@@ -10,7 +10,10 @@
 //! order of the list depends on positions only.
 //! **Cost** O(N + cells + candidates) to make; no allocation after the arrays have grown.
 
+use std::ops::Range;
+
 use glam::DVec2;
+use rayon::prelude::*;
 
 use super::super::grid::{each_cell, mix};
 use super::super::work::Work;
@@ -21,6 +24,8 @@ use crate::problem::Problem;
 const SKIN_SHARE: f64 = 0.35;
 /// More pairs than this for each edge are not listed: the reach is halved instead, so that memory is bounded.
 const MOST_PAIRS_PER_EDGE: usize = 60;
+/// Edges whose neighbours are looked up together.
+const EDGES_PER_CHUNK: usize = 2048;
 /// A cell is at least this share of the largest half width, or one thick edge would be in too many.
 const MOST_CELLS_ACROSS: f64 = 32.0;
 
@@ -32,7 +37,7 @@ pub(crate) struct Bounds {
 }
 
 /// A rule of what pairs of edges have to keep.
-pub(crate) trait Spacing {
+pub(crate) trait Spacing: Sync {
     /// Half the width of an edge, in mm; 0 if only its centreline matters.
     fn thickness_mm(&self, edge: usize) -> f64;
     /// The most that any pair's bounds end beyond the two thicknesses, in mm.
@@ -64,7 +69,15 @@ pub(super) struct PairList {
     entries: Vec<u32>,
     /// For each entry, the end of the run of siblings it is in.
     run_ends: Vec<u32>,
-    stamps: Vec<u32>,
+    chunks: Vec<Chunk>,
+}
+
+/// What the edges of one chunk found.
+#[derive(Default)]
+struct Chunk {
+    pairs: Vec<Pair>,
+    candidates: Vec<u32>,
+    n_visits: usize,
 }
 
 impl PairList {
@@ -99,8 +112,10 @@ impl PairList {
         let mut most_pairs = MOST_PAIRS_PER_EDGE * problem.n_nodes();
         loop {
             self.skin_mm = SKIN_SHARE * spacing.reach_mm();
-            let mut search = Search { problem, spacing: &*spacing, positions, accepted, cells_per_mm: 0.0 };
-            search.cells_per_mm = search.cells_per_mm(self.skin_mm);
+            let slack_mm = 2.0 * self.skin_mm;
+            let mut search =
+                Search { problem, spacing: &*spacing, positions, accepted, cells_per_mm: 0.0, slack_mm };
+            search.cells_per_mm = search.cells_per_mm();
             self.enter(&search);
             if self.collect(&search, most_pairs, work) {
                 return;
@@ -157,39 +172,65 @@ impl PairList {
 
     /// Lists the pairs; false if there are more than `most_pairs`.
     fn collect<S: Spacing>(&mut self, search: &Search<S>, most_pairs: usize, work: &mut Work) -> bool {
-        let mask = self.starts.len() - 2;
         let n_nodes = search.problem.n_nodes();
         let margin_mm = search.spacing.reach_mm() + 2.0 * self.skin_mm;
-        self.stamps.clear();
-        self.stamps.resize(n_nodes, 0);
+        let Self { pairs, chunks, starts, entries, run_ends, .. } = self;
+        let cells = Cells { starts, entries, run_ends };
+        chunks.resize_with(n_nodes.div_ceil(EDGES_PER_CHUNK), Chunk::default);
+        chunks.par_iter_mut().enumerate().for_each(|(idx, chunk)| {
+            let edges = (idx * EDGES_PER_CHUNK).max(1)..((idx + 1) * EDGES_PER_CHUNK).min(n_nodes);
+            chunk.collect(search, &cells, (edges, margin_mm, most_pairs));
+        });
+        work.spend(n_nodes + chunks.iter().map(|chunk| chunk.n_visits).sum::<usize>());
+        pairs.clear();
+        chunks.iter().for_each(|chunk| pairs.extend_from_slice(&chunk.pairs));
+        pairs.len() <= most_pairs
+    }
+}
+
+/// The grid as it is read.
+struct Cells<'a> {
+    starts: &'a [u32],
+    entries: &'a [u32],
+    run_ends: &'a [u32],
+}
+
+impl Chunk {
+    fn collect<S: Spacing>(
+        &mut self,
+        search: &Search<S>,
+        cells: &Cells,
+        (edges, margin_mm, most_pairs): (Range<usize>, f64, usize),
+    ) {
+        let mask = cells.starts.len() - 2;
         self.pairs.clear();
-        let mut n_visits = n_nodes;
-        for edge in 1..n_nodes {
+        self.n_visits = 0;
+        for edge in edges {
             let parent = search.problem.parent[edge];
+            self.candidates.clear();
             search.each_cell(edge, margin_mm, |cell| {
                 let list = mix(cell) & mask;
-                let (mut idx, end) = (self.starts[list] as usize, self.starts[list + 1] as usize);
+                let (mut idx, end) = (cells.starts[list] as usize, cells.starts[list + 1] as usize);
                 while idx < end {
-                    n_visits += 1;
-                    let other = self.entries[idx] as usize;
-                    if search.problem.parent[other] == parent {
-                        idx = self.run_ends[idx] as usize;
+                    self.n_visits += 1;
+                    let other = cells.entries[idx];
+                    if search.problem.parent[other as usize] == parent {
+                        idx = cells.run_ends[idx] as usize;
                         continue;
                     }
                     idx += 1;
-                    let is_new = std::mem::replace(&mut self.stamps[other], edge as u32) != edge as u32;
-                    if is_new && other < edge && other != parent as usize {
-                        self.pairs.extend(search.pair(other, edge, 2.0 * self.skin_mm));
+                    if (other as usize) < edge && other != parent {
+                        self.candidates.push(other);
                     }
                 }
             });
+            self.candidates.sort_unstable();
+            self.candidates.dedup();
+            self.pairs.extend(self.candidates.iter().filter_map(|&other| search.pair(other as usize, edge)));
             if self.pairs.len() > most_pairs {
-                work.spend(n_visits);
-                return false;
+                return;
             }
         }
-        work.spend(n_visits);
-        true
     }
 }
 
@@ -200,12 +241,14 @@ struct Search<'a, S> {
     positions: &'a [DVec2],
     accepted: &'a [DVec2],
     cells_per_mm: f64,
+    /// By how much a pair can come nearer while the list holds.
+    slack_mm: f64,
 }
 
 impl<S: Spacing> Search<'_, S> {
     /// Cells about as large as an edge is long or as a search is wide, whichever is more, so that there are
     /// few cells for each edge.
-    fn cells_per_mm(&self, skin_mm: f64) -> f64 {
+    fn cells_per_mm(&self) -> f64 {
         let n_edges = self.positions.len().max(2) - 1;
         let extent = |edge: usize| {
             self.ends(edge).0.distance(self.ends(edge).1) + 2.0 * self.spacing.thickness_mm(edge)
@@ -213,7 +256,7 @@ impl<S: Spacing> Search<'_, S> {
         let mean_mm = (1..self.positions.len()).map(extent).sum::<f64>() / n_edges as f64;
         let thickest_mm = (1..self.positions.len()).map(|e| self.spacing.thickness_mm(e)).fold(0.0, f64::max);
         let cell_mm =
-            mean_mm.max(self.spacing.reach_mm() + 2.0 * skin_mm).max(thickest_mm / MOST_CELLS_ACROSS);
+            mean_mm.max(self.spacing.reach_mm() + self.slack_mm).max(thickest_mm / MOST_CELLS_ACROSS);
         1.0 / cell_mm.max(f64::MIN_POSITIVE)
     }
 
@@ -230,15 +273,15 @@ impl<S: Spacing> Search<'_, S> {
         });
     }
 
-    /// The pair, if it can come within its bounds while both move by half of `slack_mm`.
-    fn pair(&self, first: usize, second: usize, slack_mm: f64) -> Option<Pair> {
+    /// The pair, if it can come within its bounds while the list holds.
+    fn pair(&self, first: usize, second: usize) -> Option<Pair> {
         let (p, q) = (self.ends(first), self.ends(second));
         let thick_mm = self.spacing.thickness_mm(first) + self.spacing.thickness_mm(second);
-        if are_apart(p, q, thick_mm + self.spacing.reach_mm() + slack_mm) {
+        if are_apart(p, q, thick_mm + self.spacing.reach_mm() + self.slack_mm) {
             return None;
         }
         let bounds = self.spacing.bounds(self.accepted, first, second)?;
-        let reach_mm = bounds.floor_mm + bounds.width_mm + slack_mm;
+        let reach_mm = bounds.floor_mm + bounds.width_mm + self.slack_mm;
         let is_near = Contact::between(p, q).distance < reach_mm;
         is_near.then_some(Pair { first: first as u32, second: second as u32, bounds })
     }
