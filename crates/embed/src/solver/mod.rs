@@ -2,6 +2,7 @@
 //!
 //! | file | what |
 //! |---|---|
+//! | `mirrors/…` | before any method: on which side each turn goes |
 //! | `shape` | a layout by its ratios |
 //! | `untangling` | a start: the targets themselves, untangled from the tips to the root |
 //! | `descent` | ratios towards 0, a few at a time |
@@ -23,6 +24,7 @@ mod grid;
 mod hierarchy;
 mod joint;
 mod linkage;
+pub(crate) mod mirrors;
 mod shape;
 mod similarity;
 mod untangling;
