@@ -48,7 +48,7 @@ mod weights;
 
 use espalier_model::{Comparison, Embedding, Report, Tree, ViewHierarchy};
 
-pub use certify::certify;
+pub use certify::{certify, crossing_pairs};
 pub use choices::{CrossingWeight, Freedom, KeepOut, MarinoView, Method, PoseMode, Pull, Start, TargetMode};
 pub use error::Error;
 pub use params::{MarinoParams, Params, PsoParams, SolverParams, WeightRule};
