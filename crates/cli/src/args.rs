@@ -14,12 +14,13 @@ Examples:
   espalier run my.toml --from embed --set embed.w_angle=3    again from a stage on
   espalier embed out/airway --set embed.pso.freedom=s       one stage of a run folder
   espalier skeleton mask.nii.gz -o out/skeleton         one stage on files
+  espalier verify out/airway                            does everything hold that the folder says?
   espalier phantom airway -o phantoms/airway            test data with its truth
 
 Exit codes:
   0 done   1 a bug of ours   2 usage or config   3 input malformed or empty   5 over a stated limit
-  6 topology refused by policy   8 no certified layout, or an altered file   73 cannot create
-  74 missing or unreadable file, I/O   75 another run holds the folder";
+  6 topology refused by policy   8 no certified layout, an altered file, or a claim that does not hold
+  73 cannot create   74 missing or unreadable file, I/O   75 another run holds the folder";
 
 /// A CT scan of a treelike organ, airways or vessels, or a traced neuron, grown flat: one planar picture of
 /// every branch, without overlaps.
@@ -70,6 +71,8 @@ pub(crate) enum Command {
     Embed(StageArguments),
     /// Pictures:  espalier render TREE VIEWS EMBEDDING -o DIR
     Render(StageArguments),
+    /// Check a run folder: digests, certificate, and every number computed again:  espalier verify RUN
+    Verify(VerifyArguments),
 }
 
 /// `espalier run`.
@@ -113,6 +116,17 @@ pub(crate) struct StageArguments {
     /// Take the settings from this config
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
+}
+
+/// `espalier verify`.
+#[derive(Debug, Args)]
+pub(crate) struct VerifyArguments {
+    /// The run folder
+    #[arg(value_name = "RUN")]
+    pub(crate) folder: PathBuf,
+    /// Print the checks as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 fn parse_override(text: &str) -> Result<Override, String> {

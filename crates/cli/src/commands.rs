@@ -9,7 +9,8 @@ use espalier_model::Diagnose;
 use espalier_model::diagnose::Class;
 use espalier_pipeline::{Artifact, Config, Error, Loaded, Override, Request, Stage, Summary};
 
-use crate::args::{Arguments, Command, PhantomArguments, RunArguments, StageArguments};
+use crate::args::{Arguments, Command, PhantomArguments, RunArguments, StageArguments, VerifyArguments};
+use crate::checks;
 use crate::progress::{self, Progress};
 
 /// Memory assumed where the machine does not tell its own.
@@ -27,12 +28,27 @@ pub(crate) fn execute(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Views(stage) => run_stage(arguments, stage, Stage::Views)?,
         Command::Embed(stage) => run_stage(arguments, stage, Stage::Embed)?,
         Command::Render(stage) => run_stage(arguments, stage, Stage::Render)?,
+        Command::Verify(verify) => return verify_folder(arguments, verify),
     };
     for file in &summary.highlights {
         progress::result(&summary.out.join(file).display().to_string());
     }
     progress::result(&format!("digest {}", summary.digest));
     Ok(())
+}
+
+/// Checks a run folder and prints what came of each claim.
+fn verify_folder(arguments: &Arguments, verify: &VerifyArguments) -> anyhow::Result<()> {
+    let threads = arguments.common.threads.map(usize::from);
+    let verification = espalier_pipeline::verify(&verify.folder, threads)?;
+    if verify.json {
+        progress::result(verification.to_json().trim_end());
+    } else {
+        let is_shown = |fails: bool| fails || !arguments.common.quiet;
+        checks::table(&verification, is_shown).iter().for_each(|line| progress::result(line));
+        progress::result(&format!("digest {}", verification.digest));
+    }
+    Ok(verification.verdict()?)
 }
 
 /// Prints an error with its code and way out, and gives the exit code of its class.

@@ -4,6 +4,7 @@
 //! standard output, progress and errors to standard error.
 
 mod args;
+mod checks;
 mod commands;
 mod progress;
 

@@ -69,7 +69,9 @@ fn help_teaches_and_succeeds() {
     let output = espalier(folder.path(), &["--help"]);
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert_eq!(output.status.code(), Some(0));
-    for command in ["run", "phantom", "volume", "skeleton", "radius", "tree", "views", "embed", "render"] {
+    for command in
+        ["run", "phantom", "volume", "skeleton", "radius", "tree", "views", "embed", "render", "verify"]
+    {
         assert!(text.contains(&format!("\n  {command} ")), "no {command} in: {text}");
     }
     assert!(text.contains("Exit codes:"));
@@ -252,4 +254,29 @@ fn stages_of_a_run_folder() {
             ["deep/down/run", stage].map(|run| fs::read(folder.path().join(run).join(result)).expect("file"));
         assert!(own == other, "{stage} into another folder");
     }
+}
+
+#[test]
+fn verify_prints_a_table_and_fails_where_a_claim_does() {
+    let folder = folder_with("y.swc", b"1 1 0 0 0 1 -1\n2 3 0 0 9 1 1\n3 3 4 0 15 1 2\n4 3 -4 1 15 1 2\n");
+    let small = ["--set", "embed.pso.particles=3", "--set", "embed.pso.iterations=1"];
+    let run = [&["run", "y.swc", "-o", "out"], &small[..]].concat();
+    assert_eq!(espalier(folder.path(), &run).status.code(), Some(0));
+    let before = listing(folder.path());
+    let output = espalier(folder.path(), &["verify", "out"]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{text}{}", stderr(&output));
+    assert!(text.contains("crossings") && text.contains(" 0 fail, ") && text.contains("digest "), "{text}");
+    assert_eq!(listing(folder.path()), before, "nothing is written");
+
+    let table = folder.path().join("out/compare.tsv");
+    let changed = fs::read_to_string(&table).expect("a table").replacen("radial\t0", "radial\t1", 1);
+    fs::write(&table, changed).expect("write");
+    let output = espalier(folder.path(), &["verify", "out", "--json"]);
+    let json: String = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(8), "{json}");
+    assert!(json.contains("\"holds\": false") && stderr(&output).contains("E-VERIFY"), "{json}");
+    fs::remove_file(folder.path().join("out/nodes.tsv")).expect("remove");
+    refused(&folder, &["verify", "out"], 74, &["nodes.tsv"]);
+    refused(&folder, &["verify", "nowhere"], 74, &["SHA256SUMS"]);
 }

@@ -59,6 +59,16 @@ pub enum Error {
         /// The crossings of its coordinates.
         found: usize,
     },
+    /// Claims of a run folder that do not hold.
+    #[error("{folder}: {n_failed} of its claims do not hold; the first: {first}", folder = folder.display())]
+    Unverified {
+        /// The run folder.
+        folder: PathBuf,
+        /// How many claims do not hold.
+        n_failed: usize,
+        /// The first of them.
+        first: String,
+    },
     /// A stage that this input does not pass through was asked for.
     #[error("--{flag} {stage}: a run from this input has no such stage; it has {available}")]
     NoSuchStage {
@@ -172,6 +182,7 @@ impl Diagnose for Error {
             Self::MissingArtifact { .. } => "E-RUN-MISSING-FILE",
             Self::Altered { .. } => "E-RUN-ALTERED-FILE",
             Self::Certificate { .. } => "E-RUN-CERTIFICATE",
+            Self::Unverified { .. } => "E-VERIFY",
             Self::NoSuchStage { .. } | Self::EmptyRange { .. } => "E-RUN-STAGES",
             Self::Input { .. } => "E-INPUT",
             Self::OtherSettings { .. } => "E-RUN-SETTINGS",
@@ -196,7 +207,7 @@ impl Diagnose for Error {
             | Self::OtherInput { .. }
             | Self::Threads { .. } => Class::Usage,
             Self::MissingArtifact { .. } | Self::Read { .. } | Self::Write { .. } => Class::Io,
-            Self::Altered { .. } | Self::Certificate { .. } => Class::Uncertified,
+            Self::Altered { .. } | Self::Certificate { .. } | Self::Unverified { .. } => Class::Uncertified,
             Self::TooLarge { .. } => Class::Limit,
             Self::Create { .. } => Class::CannotCreate,
             Self::Locked { .. } => Class::Locked,
@@ -207,6 +218,7 @@ impl Diagnose for Error {
         match self {
             Self::Config(error) => error.hint(),
             Self::Stage { cause, .. } | Self::File { cause, .. } => cause.hint(),
+            Self::Unverified { .. } => "use none of it; make it again with espalier run".to_owned(),
             Self::Certificate { .. } => "make the embedding again with espalier embed".to_owned(),
             Self::MissingArtifact { .. } => "start from an earlier stage with --from, or name the file".to_owned(),
             Self::Altered { .. } => {

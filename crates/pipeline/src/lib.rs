@@ -10,6 +10,7 @@
 //! | the run folder: atomic files, digests, one lock | `folder` |
 //! | how a result came about, what each method cost | `provenance`, `methods` |
 //! | what the columns of the tables mean | `dictionary` |
+//! | a run folder held against itself | [`verify()`] |
 //!
 //! **Architecture Invariant:** a stage is handed what its predecessor *wrote*, as it would be read back: a run
 //! that starts in the middle gives the same bytes as one that starts at the beginning.
@@ -18,7 +19,6 @@
 
 mod artifacts;
 mod clock;
-pub mod compare;
 pub mod config;
 mod dictionary;
 mod error;
@@ -31,12 +31,15 @@ pub mod run;
 mod settings;
 pub mod stage;
 mod steps;
+mod verify;
 
 pub use config::{Config, ConfigError, Loaded, Override};
 pub use error::Error;
+pub use espalier_verify::{Check, Outcome};
 pub use event::Event;
 pub use phantom::make_phantom;
 pub use provenance::input_of_run;
 pub use run::{Request, Summary, run};
 pub use settings::Difference;
 pub use stage::{Artifact, Stage};
+pub use verify::{Verification, verify};

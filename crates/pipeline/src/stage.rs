@@ -120,14 +120,7 @@ impl Stage {
                 "/dictionary.tsv",
                 "convergence.tsv",
             ],
-            Self::Render => &[
-                "/planar.png",
-                "/planar.svg",
-                "/planar.exr",
-                "/global-view.png",
-                "/compare.png",
-                "/compare.svg",
-            ],
+            Self::Render => &["/planar.png", "/planar.svg", "/planar.exr", "/global-view.png"],
         };
         let folder = self.folder();
         let mut paths: Vec<String> = files

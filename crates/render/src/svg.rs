@@ -39,8 +39,6 @@ pub(crate) struct Content<'a> {
     pub coloring: &'a Coloring,
     /// What the document is called.
     pub title: &'a str,
-    /// What the ids of this tree begin with; empty unless the document shows several.
-    pub prefix: &'a str,
 }
 
 /// Writes the document.
@@ -65,25 +63,19 @@ pub(crate) fn svg(content: &Content<'_>, page: &Page, groups: &[Group], colors: 
         hex(colors.background)
     );
     tree(&mut out, content, page, colors);
-    write_groups(&mut out, groups);
+    for group in groups {
+        let _ = writeln!(out, "<g id=\"{}\" font-family=\"{FONTS}\">", group.name);
+        for mark in &group.marks {
+            write_mark(&mut out, mark);
+        }
+        out.push_str("</g>\n");
+    }
     out.push_str("</svg>\n");
     out
 }
 
-/// Marks in named groups.
-pub(crate) fn write_groups(out: &mut String, groups: &[Group]) {
-    for group in groups {
-        let _ = writeln!(out, "<g id=\"{}\" font-family=\"{FONTS}\">", group.name);
-        for mark in &group.marks {
-            write_mark(out, mark);
-        }
-        out.push_str("</g>\n");
-    }
-}
-
 /// The branches, thick over thin as in the raster; of equals the parent over the starts of its children.
-pub(crate) fn tree(out: &mut String, content: &Content<'_>, page: &Page, colors: &PageColors) {
-    let prefix = content.prefix;
+fn tree(out: &mut String, content: &Content<'_>, page: &Page, colors: &PageColors) {
     let list = content.branches.list();
     if list.is_empty() {
         let center = page.px(content.scene.points_mm[0].truncate());
@@ -91,7 +83,7 @@ pub(crate) fn tree(out: &mut String, content: &Content<'_>, page: &Page, colors:
         let fill = hex(content.coloring.palette.at(content.coloring.ends[0][0]));
         let _ = writeln!(
             out,
-            "<circle id=\"{prefix}root\" cx=\"{:.2}\" cy=\"{:.2}\" r=\"{radius:.2}\" fill=\"{fill}\"/>",
+            "<circle id=\"root\" cx=\"{:.2}\" cy=\"{:.2}\" r=\"{radius:.2}\" fill=\"{fill}\"/>",
             center.x, center.y
         );
         return;
@@ -103,14 +95,14 @@ pub(crate) fn tree(out: &mut String, content: &Content<'_>, page: &Page, colors:
         let rim = hex(colors.rim);
         let _ = writeln!(
             out,
-            "<g id=\"{prefix}edges\" stroke=\"{rim}\" stroke-opacity=\"0.75\" stroke-width=\"1.3\" stroke-linejoin=\"round\">"
+            "<g id=\"edges\" stroke=\"{rim}\" stroke-opacity=\"0.75\" stroke-width=\"1.3\" stroke-linejoin=\"round\">"
         );
         for branch in &order {
-            let _ = writeln!(out, "<use xlink:href=\"#{prefix}branch-{branch}\"/>");
+            let _ = writeln!(out, "<use xlink:href=\"#branch-{branch}\"/>");
         }
         out.push_str("</g>\n");
     }
-    let _ = writeln!(out, "<g id=\"{prefix}branches\">");
+    out.push_str("<g id=\"branches\">\n");
     for &branch in &order {
         write_branch(out, content, page, (branch, &list[branch]));
     }
@@ -123,7 +115,7 @@ fn write_branch(
     page: &Page,
     (branch_idx, branch): (usize, &Branch),
 ) {
-    let (tree, scene, prefix) = (content.tree, content.scene, content.prefix);
+    let (tree, scene) = (content.tree, content.scene);
     let (mut value, mut length) = (0.0, 0.0);
     for node in branch.nodes.clone() {
         let edge = tree.edge_length_mm(node);
@@ -147,7 +139,7 @@ fn write_branch(
     let parent = branch.parent.map_or_else(String::new, |parent| format!(" data-parent=\"{parent}\""));
     let _ = writeln!(
         out,
-        "<path id=\"{prefix}branch-{branch_idx}\" data-branch=\"{branch_idx}\"{parent} data-generation=\"{}\" \
+        "<path id=\"branch-{branch_idx}\" data-branch=\"{branch_idx}\"{parent} data-generation=\"{}\" \
          data-strahler=\"{}\" data-nodes=\"{} {}\" data-length-mm=\"{length:.6}\" data-radius-mm=\"{:.6}\" {paint}/>",
         branch.generation,
         branch.strahler,

@@ -12,7 +12,7 @@
 //! **Cost** particles · iterations evaluations at most, 24 bytes per particle and ratio.
 
 use espalier_geom::random::{Purpose, Stream};
-use espalier_model::{Termination, TracePoint};
+use espalier_model::TracePoint;
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -70,7 +70,6 @@ pub(crate) fn layout(
         positions: energy.positions(&swarm.global_best),
         evaluations: swarm.evaluations,
         trace: swarm.trace,
-        termination: Termination::BudgetSpent,
     })
 }
 
@@ -90,13 +89,7 @@ fn targets_met(
         crossings: 0,
     };
     report(&point, params, progress);
-    Layout {
-        name,
-        positions: energy.positions(targets),
-        evaluations: 1,
-        trace: vec![point],
-        termination: Termination::Optimal,
-    }
+    Layout { name, positions: energy.positions(targets), evaluations: 1, trace: vec![point] }
 }
 
 fn name(params: &PsoParams) -> String {

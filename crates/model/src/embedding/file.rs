@@ -60,7 +60,6 @@ impl Termination {
         match self {
             Self::Constructed => "constructed",
             Self::Optimal => "optimal",
-            Self::Converged => "converged",
             Self::BudgetSpent => "budget-spent",
         }
     }
@@ -160,7 +159,6 @@ enum TargetKindFile {
 enum TerminationFile {
     Constructed,
     Optimal,
-    Converged,
     BudgetSpent,
 }
 
@@ -466,7 +464,7 @@ macro_rules! same_variants {
 same_fields!(Energy, EnergyFile { length, angle, side, placement, crossing });
 same_fields!(TracePoint, TracePointFile { iteration, evaluations, energy, crossings });
 same_variants!(TargetKind, TargetKindFile { Intrinsic, Projected, IntrinsicMirrored, ProjectedMirrored });
-same_variants!(Termination, TerminationFile { Constructed, Optimal, Converged, BudgetSpent });
+same_variants!(Termination, TerminationFile { Constructed, Optimal, BudgetSpent });
 
 #[cfg(test)]
 mod tests {

@@ -1,3 +1,0 @@
-//! Methods, or runs, side by side.
-
-pub(crate) mod figure;

@@ -1,0 +1,113 @@
+//! What `compare.json` says of every layout of the run.
+//!
+//! **Input** the claim, the comparison. **Output** a check per layout, and that all belong together.
+//! **Steps** per layout: meetings by the sweep, overlaps, losses, and the energy from ratios that are measured here; a
+//! deviation that rounding explains counts as none. The layout is scored as it is or as its mirror image, whichever
+//! agrees: the mirror of the whole is free. **Cost** as `layout`, for each method.
+
+use espalier_model::{Branches, ComparedLayout, Comparison, Losses, MethodRow};
+
+use crate::check::Check;
+use crate::energy::{Scored, energy};
+use crate::flat::{Flat, mirrored};
+use crate::layout::Claim;
+use crate::losses::losses;
+use crate::overlaps;
+use crate::ratios;
+use crate::sweep::meetings;
+use crate::weights::NodeWeights;
+
+/// Share by which an energy may be off.
+const ROUNDING: f64 = 1e-9;
+
+/// Checks every layout of a comparison.
+///
+/// # Panics
+/// If a layout is not of the claim's tree, by the number of its nodes.
+#[must_use]
+pub fn check_comparison(claim: &Claim<'_>, comparison: &Comparison) -> Vec<Check> {
+    let Claim { tree, embedding, weights, .. } = *claim;
+    let branches = tree.branches();
+    let weights = NodeWeights::new(tree, &branches, weights);
+    let chosen = &comparison.layouts[comparison.chosen];
+    let is_result = chosen.positions_mm == embedding.positions_mm && chosen.row.method == embedding.method;
+    let rows: Vec<&MethodRow> = comparison.layouts.iter().map(|layout| &layout.row).collect();
+    let mut checks = vec![
+        Check::same("targets", comparison.targets.as_str(), embedding.targets.digest()),
+        Check::unless(
+            "chosen",
+            chosen.row.method.as_str(),
+            (!is_result).then(|| "not the layout of the embedding".to_owned()),
+        ),
+        Check::unless(
+            "rows",
+            rows.len(),
+            (!rows.iter().copied().eq(&embedding.methods)).then(|| "not those of the embedding".to_owned()),
+        ),
+    ];
+    for layout in &comparison.layouts {
+        let scored = Compared { claim, branches: &branches, weights: &weights, layout };
+        let stated = format!("{} crossings, energy {:.6}", layout.row.crossings, layout.row.energy.total());
+        checks.push(Check::unless(format!("layout of {}", layout.row.method), stated, scored.fault()));
+    }
+    checks
+}
+
+struct Compared<'a> {
+    claim: &'a Claim<'a>,
+    branches: &'a Branches,
+    weights: &'a NodeWeights,
+    layout: &'a ComparedLayout,
+}
+
+impl Compared<'_> {
+    fn fault(&self) -> Option<String> {
+        let ComparedLayout { row, positions_mm, .. } = self.layout;
+        let found = meetings(self.claim.tree, positions_mm);
+        if found.is_complete && found.count != row.crossings {
+            return Some(format!("{} crossings", found.count));
+        }
+        let overlaps = overlaps::count(self.claim.tree, self.branches, positions_mm);
+        let is_within = (overlaps.certain..=overlaps.certain + overlaps.open).contains(&row.overlaps);
+        if overlaps.is_complete && !is_within {
+            return Some(format!("{} overlaps", overlaps.certain));
+        }
+        if row.targets != self.claim.embedding.targets.kind {
+            // Scored against targets that are not in the files.
+            return None;
+        }
+        let (as_is, mirrored) =
+            (self.fault_of_image(positions_mm), self.fault_of_image(&mirrored(positions_mm)));
+        as_is.and(mirrored)
+    }
+
+    /// The first number that one of the two mirror images does not have.
+    fn fault_of_image(&self, positions: &[glam::DVec2]) -> Option<String> {
+        let (tree, targets) = (self.claim.tree, &self.claim.embedding.targets);
+        let row = &self.layout.row;
+        let flat = Flat::new(tree, positions);
+        let (length_ratio, angle_ratio) = ratios::measured(tree, targets, &flat, self.layout.quantum_mm);
+        let branches = self.branches;
+        let (length_ratio, angle_ratio) = (&length_ratio[..], &angle_ratio[..]);
+        let scored = Scored { tree, branches, targets, flat: &flat, length_ratio, angle_ratio };
+        let found = energy(&scored, self.weights);
+        for (name, stated, found) in [
+            ("of lengths", row.energy.length, found.length),
+            ("of angles", row.energy.angle, found.angle),
+            ("of sides", row.energy.side, found.side),
+            ("of placement", row.energy.placement, found.placement),
+        ] {
+            let is_near = (stated - found).abs() <= ROUNDING * found.abs().max(1.0);
+            if !is_near {
+                return Some(format!("energy {name} {found:.9}, stated {stated:.9}"));
+            }
+        }
+        let found = losses((tree, branches), targets, (&flat, positions));
+        found.iter().find_map(|loss| {
+            let column = Losses::COLUMNS.iter().find(|column| column.column.name == loss.name)?;
+            let stated = (column.of)(&row.losses);
+            let is_near = (stated - loss.value).abs() <= loss.tolerance;
+            (!is_near).then(|| format!("{} {:.9}, stated {stated:.9}", loss.name, loss.value))
+        })
+    }
+}

@@ -1,0 +1,195 @@
+//! `espalier verify`: what a run writes holds, and what is changed in a copy of it is found.
+#![allow(clippy::expect_used, reason = "a test says what it expects")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use espalier_model::Diagnose;
+use espalier_model::diagnose::Class;
+use espalier_pipeline::{Error, Outcome, Override, verify};
+use espalier_tests::{run, set, small_swarm};
+use tempfile::TempDir;
+
+/// A run of the fixture neuron.
+fn run_folder(overrides: &[Override]) -> TempDir {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/neuron.swc");
+    let all: Vec<Override> = small_swarm().into_iter().chain(overrides.iter().cloned()).collect();
+    run(&fixture, folder.path(), &all, 2).expect("a run");
+    folder
+}
+
+/// The claims that fail, as `file: claim`.
+fn failures(folder: &Path) -> Vec<String> {
+    let verification = verify(folder, Some(2)).expect("a readable folder");
+    let failed = verification.checks.iter().filter(|(_, check)| check.outcome == Outcome::Fails);
+    failed.map(|(file, check)| format!("{file}: {}", check.name)).collect()
+}
+
+/// A copy of a run folder with one file changed; its digest put right too if `is_resealed`.
+fn tampered(original: &Path, file: &str, is_resealed: bool, change: impl FnOnce(&str) -> String) -> TempDir {
+    let copy = tempfile::tempdir().expect("temporary folder");
+    copy_folder(original, copy.path());
+    let path = copy.path().join(file);
+    let text = fs::read_to_string(&path).expect("text");
+    let changed = change(&text);
+    assert!(changed != text, "nothing was changed in {file}");
+    fs::write(&path, changed).expect("write");
+    if is_resealed {
+        reseal(copy.path(), file);
+    }
+    copy
+}
+
+fn copy_folder(from: &Path, to: &Path) {
+    fs::create_dir_all(to).expect("folder");
+    for entry in fs::read_dir(from).expect("folder") {
+        let path = entry.expect("entry").path();
+        let target = to.join(path.file_name().expect("a name"));
+        if path.is_dir() { copy_folder(&path, &target) } else { _ = fs::copy(&path, &target).expect("copy") }
+    }
+}
+
+/// Gives a file the digest that `SHA256SUMS` asks for, as someone would who knows how it is made.
+fn reseal(folder: &Path, file: &str) {
+    let sums = fs::read_to_string(folder.join("SHA256SUMS")).expect("SHA256SUMS");
+    let failed = verify_digest(folder, file);
+    let sealed: Vec<String> =
+        sums.lines()
+            .map(|line| {
+                if line.ends_with(&format!("  {file}")) {
+                    format!("{failed}  {file}")
+                } else {
+                    line.to_owned()
+                }
+            })
+            .collect();
+    fs::write(folder.join("SHA256SUMS"), sealed.join("\n") + "\n").expect("write");
+}
+
+/// The digest that `verify` finds for a file.
+fn verify_digest(folder: &Path, file: &str) -> String {
+    let verification = verify(folder, Some(1)).expect("a readable folder");
+    let check = verification.checks.iter().find(|(name, check)| name == file && check.name == "sha256");
+    check.expect("a digest").1.found.to_string()
+}
+
+/// The number at a place of an array in JSON, changed.
+fn change_number(text: &str, array: &str, place: usize, change: impl Fn(f64) -> f64) -> String {
+    let start = text.find(array).expect("the array") + array.len();
+    let is_number = |c: char| c.is_ascii_digit() || "+-.eE".contains(c);
+    let mut rest = start;
+    for _ in 0..place {
+        rest += text[rest..].find(is_number).expect("a number");
+        rest += text[rest..].find(|c| !is_number(c)).expect("an end");
+    }
+    rest += text[rest..].find(is_number).expect("a number");
+    let end = rest + text[rest..].find(|c| !is_number(c)).expect("an end");
+    let number: f64 = text[rest..end].parse().expect("a number");
+    format!("{}{:?}{}", &text[..rest], change(number), &text[end..])
+}
+
+#[test]
+fn runs_hold_whatever_their_settings() {
+    for overrides in [
+        vec![],
+        vec![set("embed.method", "radial")],
+        vec![set("embed.method", "pso"), set("embed.targets", "projected"), set("embed.pso.freedom", "s")],
+        vec![set("embed.w_side", 2.0), set("embed.w_crossing", 500.0), set("embed.pose", "view")],
+        vec![set(
+            "embed.weights",
+            "[{ generations = [0, 1], w_length = 7.0 }, { nodes = [3], w_angle = 0.0 }]",
+        )],
+    ] {
+        let folder = run_folder(&overrides);
+        let verification = verify(folder.path(), Some(2)).expect("a readable folder");
+        let failed: Vec<_> = verification.checks.iter().filter(|(_, check)| check.fails()).collect();
+        assert!(failed.is_empty(), "{overrides:?}: {failed:?}");
+        assert!(verification.verdict().is_ok() && verification.checks.len() > 40);
+        let json = verification.to_json();
+        assert!(json.contains("\"format\": \"espalier-verification\"") && json.contains("\"holds\": true"));
+    }
+}
+
+#[test]
+fn what_is_changed_is_found() {
+    let original = run_folder(&[]);
+    let change = |file: &str, is_resealed, change: &dyn Fn(&str) -> String| {
+        tampered(original.path(), file, is_resealed, change)
+    };
+    let embedding = "embedding.json";
+
+    // One byte of a picture, which nothing else looks into.
+    let byte = change("planar.svg", false, &|text| text.replacen("svg", "svG", 1));
+    assert_eq!(failures(byte.path()), ["planar.svg: sha256"]);
+    let error = verify(byte.path(), Some(1)).expect("readable").verdict().expect_err("altered");
+    assert_eq!((error.code(), error.class()), ("E-VERIFY", Class::Uncertified));
+    assert!(error.to_string().contains("planar.svg, sha256"), "{error}");
+
+    // One coordinate, by ten thousand steps, digest put right.
+    let moved = change(embedding, true, &|text| {
+        change_number(text, "\"positions_mm\":", 40, |x| {
+            format!("{:.9}", x + 1e-5).parse().expect("a number")
+        })
+    });
+    let found = failures(moved.path());
+    for claim in ["embedding.json: length ratios", "compare.json: chosen", "nodes.tsv: nodes"] {
+        assert!(found.iter().any(|failure| failure == claim), "{claim}: {found:?}");
+    }
+
+    // One ratio, one loss, one target.
+    for (array, place, claim) in [
+        ("\"angle_ratio\":", 30, "embedding.json: angle ratios"),
+        ("\"losses\":{\"length_loss_mean\":", 0, "embedding.json: length_loss_mean"),
+        ("\"heading_rad\":", 12, "embedding.json: target headings"),
+        ("\"energy\":{\"length\":", 0, "embedding.json: energy of lengths"),
+    ] {
+        let changed = change(embedding, true, &|text| change_number(text, array, place, |x| x + 1e-4));
+        let found = failures(changed.path());
+        assert!(found.iter().any(|failure| failure == claim), "{claim}: {found:?}");
+    }
+
+    // A cell of a table; a layout of another method; a setting.
+    let cell = change("compare.tsv", true, &|text| text.replacen("\nradial\t0", "\nradial\t2", 1));
+    assert_eq!(failures(cell.path()), ["compare.tsv: methods"]);
+    let layout = change("compare.json", true, &|text| text.replacen("\"stress\":0.", "\"stress\":0.0", 1));
+    assert!(failures(layout.path()).iter().any(|failure| failure.starts_with("compare.json: layout of")));
+    let config = "provenance/config.resolved.toml";
+    let setting = change(config, true, &|text| text.replacen("w_placement = 0.01", "w_placement = 0.02", 1));
+    assert!(failures(setting.path()).contains(&"embedding.json: energy of placement".to_owned()));
+}
+
+#[test]
+fn what_cannot_be_read_is_said_so() {
+    let original = run_folder(&[]);
+    let class = |folder: &Path| match verify(folder, Some(1)) {
+        Ok(verification) => verification.verdict().expect_err("a claim that fails").class(),
+        Err(error) => error.class(),
+    };
+    // Malformed, and sealed as if it were right; only altered; a coordinate with digits too many.
+    let cut = |text: &str| text[..text.len() / 2].to_owned();
+    let sealed = tampered(original.path(), "embedding.json", true, cut);
+    assert_eq!(class(sealed.path()), Class::Input);
+    let altered = tampered(original.path(), "embedding.json", false, cut);
+    assert_eq!(class(altered.path()), Class::Uncertified);
+    assert!(failures(altered.path()).contains(&"embedding.json: readable".to_owned()));
+    let version = |text: &str| text.replacen("\"version\":", "\"version\":9", 1);
+    let later = tampered(original.path(), "embedding.json", true, version);
+    let error = verify(later.path(), Some(1)).expect_err("unknown version");
+    assert_eq!((error.code(), error.class()), ("E-FILE-VERSION", Class::Input));
+
+    // Another tree under the same name.
+    let tree = |text: &str| text.replacen(" 3 ", " 2 ", 1);
+    let other = tampered(original.path(), "tree.swc", true, tree);
+    assert!(failures(other.path()).contains(&"embedding.json: tree".to_owned()));
+
+    for file in ["nodes.tsv", "SHA256SUMS", "tree.swc"] {
+        let copy = tempfile::tempdir().expect("temporary folder");
+        copy_folder(original.path(), copy.path());
+        fs::remove_file(copy.path().join(file)).expect("remove");
+        assert_eq!(class(copy.path()), Class::Io, "{file}");
+    }
+    let sums = tampered(original.path(), "SHA256SUMS", false, |text| format!("{text}no digest\n"));
+    assert_eq!(class(sums.path()), Class::Input);
+    assert!(matches!(verify(&PathBuf::from("no/such/folder"), None), Err(Error::Read { .. })));
+}
