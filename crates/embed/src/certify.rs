@@ -48,7 +48,20 @@ struct Span {
 /// ```
 #[must_use]
 pub fn certify(tree: &Tree, positions_mm: &[DVec2]) -> Certificate {
-    let positions = positions_mm;
+    sweep(tree, positions_mm, Certificate::MAX_PAIRS)
+}
+
+/// The pairs of edges that [`certify`] counts, in ascending order, each by its lower node: the first `most` of them.
+///
+/// # Panics
+/// As [`certify`].
+#[must_use]
+pub fn crossing_pairs(tree: &Tree, positions_mm: &[DVec2], most: usize) -> Vec<(usize, usize)> {
+    sweep(tree, positions_mm, most).pairs
+}
+
+/// Counts the pairs that meet, and keeps the first `most`.
+fn sweep(tree: &Tree, positions: &[DVec2], most: usize) -> Certificate {
     assert_eq!(positions.len(), tree.n_nodes(), "one position per node");
     let low = positions.iter().fold(DVec2::INFINITY, |low, &p| low.min(p));
     let high = positions.iter().fold(DVec2::NEG_INFINITY, |high, &p| high.max(p));
@@ -73,12 +86,12 @@ pub fn certify(tree: &Tree, positions_mm: &[DVec2]) -> Certificate {
                 certificate.crossings += 1;
                 certificate.pairs.push(pair);
             }
-            if certificate.pairs.len() >= 4 * Certificate::MAX_PAIRS {
-                keep_first(&mut certificate.pairs);
+            if certificate.pairs.len() >= 4 * most.max(1) {
+                keep_first(&mut certificate.pairs, most);
             }
         }
     }
-    keep_first(&mut certificate.pairs);
+    keep_first(&mut certificate.pairs, most);
     certificate
 }
 
@@ -101,7 +114,7 @@ fn parent_of(tree: &Tree, node: usize) -> usize {
 }
 
 /// Keeps the lowest pairs, so that what is kept does not depend on the order of the sweep.
-fn keep_first(pairs: &mut Vec<(usize, usize)>) {
+fn keep_first(pairs: &mut Vec<(usize, usize)>, most: usize) {
     pairs.sort_unstable();
-    pairs.truncate(Certificate::MAX_PAIRS);
+    pairs.truncate(most);
 }

@@ -28,6 +28,19 @@ impl From<TargetMode> for TargetKind {
     }
 }
 
+/// Whether the space behind the root is kept free while sides are searched.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum KeepOut {
+    /// Where the tree has a trunk: one branch leaves the root, and it is thicker than any other.
+    #[default]
+    Auto,
+    /// Where one branch leaves the root.
+    On,
+    /// Nowhere.
+    Off,
+}
+
 /// How the whole is turned in the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -11,6 +11,8 @@
 //! **Differs from the source** [Hu2022] checks coarse, then fine, over all pairs on a GPU.
 //! **Cost** O(N log N + boxes that meet) time; no allocation after the first call.
 
+use glam::DVec2;
+
 use crate::problem::Problem;
 
 /// Edges in a run: eight single-precision borders are one or two vector registers.
@@ -91,6 +93,12 @@ impl Lanes {
         });
         is_met.iter().enumerate().fold(0, |bits, (lane, met)| bits | met << lane)
     }
+}
+
+/// Whether no pair of edges meets.
+pub(crate) fn is_planar(problem: &Problem, positions: &[DVec2]) -> bool {
+    let (x, y): (Vec<f64>, Vec<f64>) = positions.iter().map(|p| (p.x, p.y)).unzip();
+    count(problem, &x, &y, 0, &mut Scratch::default()) == 0
 }
 
 /// The number of meeting pairs, or any number above `limit` if there are more than that.

@@ -48,8 +48,8 @@ mod weights;
 
 use espalier_model::{Comparison, Embedding, Report, Tree, ViewHierarchy};
 
-pub use certify::certify;
-pub use choices::{CrossingWeight, Freedom, MarinoView, Method, PoseMode, Pull, Start, TargetMode};
+pub use certify::{certify, crossing_pairs};
+pub use choices::{CrossingWeight, Freedom, KeepOut, MarinoView, Method, PoseMode, Pull, Start, TargetMode};
 pub use error::Error;
 pub use params::{MarinoParams, Params, PsoParams, SolverParams, WeightRule};
 
@@ -148,8 +148,10 @@ pub fn embed(
     let weights_report = weights::check(tree, &branches, params)?;
     let targets = targets::targets(tree, &branches, views, params.targets)?;
     let problem = problem::Problem::new(tree, branches, targets, params);
+    let (problem, mirrors_report) = solver::mirrors::mirrored(problem, params, seed);
     let layouts = select::run_methods(&problem, views, params, seed, events)?;
     let mut embedded = select::select(&problem, layouts, params, seed)?;
+    embedded.report.extend(mirrors_report);
     embedded.report.extend(weights_report);
     Ok(embedded)
 }

@@ -92,6 +92,7 @@ struct Judged {
     overlaps: overlap::Overlaps,
     evaluations: u64,
     trace: Vec<TracePoint>,
+    termination: Termination,
 }
 
 fn judge(
@@ -107,8 +108,8 @@ fn judge(
     let mut losses = losses::losses(problem, &unreflected);
     (losses.stress, losses.spearman) = space.compare(&posed.positions);
     let overlaps = overlap::count(problem, &posed.positions);
-    let Layout { name, evaluations, trace, .. } = layout;
-    Judged { method, name, posed, certificate, scored, losses, overlaps, evaluations, trace }
+    let Layout { name, evaluations, trace, termination, .. } = layout;
+    Judged { method, name, posed, certificate, scored, losses, overlaps, evaluations, trace, termination }
 }
 
 /// Judges the layouts and takes the best.
@@ -126,7 +127,6 @@ pub(crate) fn select(
     let layouts: Vec<ComparedLayout> =
         judged.iter().map(|judged| compared(judged, problem.targets.kind)).collect();
     let methods = layouts.iter().map(|layout| layout.row.clone()).collect();
-    let trace = judged.iter().flat_map(|judged| judged.trace.clone()).collect();
     let winner_idx = winner(&judged, params.method)?;
     let comparison = Comparison {
         tree: problem.tree.digest(),
@@ -137,14 +137,11 @@ pub(crate) fn select(
     };
     let report = report(problem, &judged, &judged[winner_idx], params.method);
 
-    let Judged { name, posed, certificate, scored, losses, method, .. } = judged.swap_remove(winner_idx);
-    let termination = if scored.energy.length + scored.energy.angle == 0.0 {
-        Termination::Optimal
-    } else if params.method.is_optimiser() || method.is_optimiser() {
-        Termination::BudgetSpent
-    } else {
-        Termination::Constructed
-    };
+    let asked = judged.iter().find(|judged| judged.method == params.method);
+    let trace = asked.map(|judged| judged.trace.clone()).unwrap_or_default();
+    let Judged { name, posed, certificate, scored, losses, termination, .. } = judged.swap_remove(winner_idx);
+    let is_lossless = scored.energy.length + scored.energy.angle == 0.0;
+    let termination = if is_lossless { Termination::Optimal } else { termination };
     let embedding = Embedding {
         tree: problem.tree.digest(),
         method: name,

@@ -12,7 +12,7 @@ use std::f64::consts::{PI, TAU};
 /// How far target angles keep from 0 and 2π, where an edge would lie on its parent.
 pub(crate) const MARGIN_RAD: f64 = 0.02;
 /// The widest gap asked for between siblings.
-const GAP_RAD: f64 = 0.05;
+pub(crate) const GAP_RAD: f64 = 0.05;
 
 /// Moves the angles of `children` apart as little as possible.
 pub(crate) fn separate(children: &[usize], view_angle_rad: &[f64], angle_rad: &mut [f64]) {

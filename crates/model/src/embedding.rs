@@ -126,6 +126,8 @@ pub enum Termination {
     Constructed,
     /// No length, angle or crossing is lost: proven optimal for its targets.
     Optimal,
+    /// Another round would have gained too little.
+    Converged,
     /// The work allowed was done.
     BudgetSpent,
 }
@@ -212,7 +214,8 @@ pub struct Embedding {
     pub pose: Pose,
     /// Why it ended.
     pub termination: Termination,
-    /// The convergence curve of the optimiser that ran, whether or not its layout won; empty if none did.
+    /// The convergence curve of the method that was asked for, whether or not its layout won; empty if it does not
+    /// search.
     pub trace: Vec<TracePoint>,
     /// All methods that ran, scored alike, this one among them.
     pub methods: Vec<MethodRow>,

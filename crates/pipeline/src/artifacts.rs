@@ -177,6 +177,23 @@ impl Artifacts {
         Ok(embedding)
     }
 
+    /// The layouts of all methods. None where there is no such file: a picture can do without it; nor for files that
+    /// the user names without it, for what lies in the folder may be another tree's.
+    pub(crate) fn comparison(&mut self, lookup: Lookup<'_>) -> Result<Option<Arc<Comparison>>, Error> {
+        let is_named = self.files.contains_key(&Artifact::Comparison);
+        let in_folder = lookup.folder.path().join(Artifact::Comparison.file());
+        let is_foreign = self.files.contains_key(&Artifact::Embedding) || !in_folder.exists();
+        if self.comparison.is_none() && !is_named && is_foreign {
+            return Ok(None);
+        }
+        let tree = self.tree(lookup)?;
+        let known = self.comparison.clone();
+        let comparison =
+            self.parsed(known, Artifact::Comparison, lookup, |text| Comparison::from_json(text, &tree))?;
+        self.comparison = Some(Arc::clone(&comparison));
+        Ok(Some(comparison))
+    }
+
     /// What memory has, else what `parse` makes of the artifact's file.
     fn parsed<T, E: Diagnose + Send + Sync + 'static>(
         &self,

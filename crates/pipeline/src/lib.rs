@@ -19,6 +19,7 @@
 
 mod artifacts;
 mod clock;
+pub mod compare;
 pub mod config;
 mod dictionary;
 mod error;

@@ -120,7 +120,14 @@ impl Stage {
                 "/dictionary.tsv",
                 "convergence.tsv",
             ],
-            Self::Render => &["/planar.png", "/planar.svg", "/planar.exr", "/global-view.png"],
+            Self::Render => &[
+                "/planar.png",
+                "/planar.svg",
+                "/planar.exr",
+                "/global-view.png",
+                "/compare.png",
+                "/compare.svg",
+            ],
         };
         let folder = self.folder();
         let mut paths: Vec<String> = files

@@ -10,9 +10,9 @@ use espalier_model::{
     Comparison, Embedding, Grid, GridError, InscribedSpheres, Ledger, Mask, MethodRow, Report, Termination,
     Tree, ViewHierarchy, nifti_out, swc,
 };
-use espalier_render::Compass;
 
 use crate::artifacts::{Artifacts, Lookup, SOURCE_KEY, SOURCE_SCAN, SOURCE_TRACING};
+use crate::compare::figure;
 use crate::config::{Config, Source};
 use crate::dictionary;
 use crate::error::Error;
@@ -248,12 +248,10 @@ fn render(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let tree = step.take(Artifacts::tree)?;
     let views = step.take(Artifacts::views)?;
     let embedding = step.take(Artifacts::embedding)?;
+    let comparison = step.take(Artifacts::comparison)?;
     let mut params = step.config.render.clone();
     params.title.get_or_insert_with(|| step.config.name.clone());
-    if params.compass == Compass::Auto {
-        // Only a scan says where right and left of the patient are.
-        params.compass = if step.artifacts.is_of_scan { Compass::Anatomical } else { Compass::Axes };
-    }
+    params.compass = figure::compass(params.compass, step.artifacts.is_of_scan);
     let made =
         espalier_render::render(&tree, &embedding, &views, &params).map_err(|error| step.failed(error))?;
     let mut files = vec![
@@ -263,6 +261,12 @@ fn render(step: &mut Step<'_>) -> Result<Outcome, Error> {
     ];
     if let Some(exr) = made.exr {
         files.push(("planar.exr".to_owned(), exr));
+    }
+    if let Some(comparison) = comparison {
+        let compass = params.compass;
+        let subject =
+            figure::Subject { name: None, tree: &tree, views: &views, comparison: &comparison, compass };
+        files.extend(figure::draw(&[subject], &params).map_err(|error| step.failed(error))?);
     }
     let line = files.iter().map(|(file, _)| file.as_str()).collect::<Vec<_>>().join(", ");
     Ok(Outcome { files, report: made.report, line })

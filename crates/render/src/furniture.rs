@@ -134,7 +134,7 @@ fn color_bar(at: DVec2, unit: f64, coloring: &Coloring, scale: &Scale, colors: &
 }
 
 /// The scale bar: a round length, at most [`SCALE_BAR`] units long. None where the tree has no size.
-fn scale_bar(page: &Page, at: DVec2, params: &Params, colors: &PageColors) -> Option<Group> {
+pub(crate) fn scale_bar(page: &Page, at: DVec2, params: &Params, colors: &PageColors) -> Option<Group> {
     let unit = page.unit_px;
     let longest_mm = SCALE_BAR.x * unit / page.px_per_mm;
     if longest_mm < 1e-9 {

@@ -64,7 +64,8 @@ fn overlaps(embedding: &Embedding) -> Option<String> {
     (own.overlaps > 0).then(|| format!("{} overlaps at true width", own.overlaps))
 }
 
-fn size_of(tree: &Tree, branches: &Branches, params: &Params) -> Vec<String> {
+/// How large the tree is, in parts.
+pub(crate) fn size_of(tree: &Tree, branches: &Branches, params: &Params) -> Vec<String> {
     let length_mm = tree.length_mm();
     // A sum of many branches: 976 µm and 4723 mm read better beside the radii than 0.976 mm and 4.723 m.
     let unit = LengthUnit::choose(params.unit, 0.1 * length_mm);
@@ -82,10 +83,12 @@ fn size_of(tree: &Tree, branches: &Branches, params: &Params) -> Vec<String> {
     parts
 }
 
-fn percent(share: f64) -> String {
+/// A share as a percentage.
+pub(crate) fn percent(share: f64) -> String {
     if share.is_finite() { format!("{:.1} %", 100.0 * share) } else { "unknown".to_owned() }
 }
 
-fn degrees(angle: f64) -> String {
+/// An angle in degrees.
+pub(crate) fn degrees(angle: f64) -> String {
     if angle.is_finite() { format!("{angle:.1}°") } else { "unknown".to_owned() }
 }

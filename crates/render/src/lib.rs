@@ -9,6 +9,7 @@
 //! | 5 | `sketch`, `cone`, `kinship` | edges as round cones in pixels |
 //! | 6 | `raster`, `samples`, `shade` | the pixels |
 //! | 7 | `paint`, `svg`, `outline`, `layers` | the files |
+//! | 8 | `side_by_side`, `tiling`, `parts` | several layouts in one figure |
 //!
 //! **Source** section 4.1 of [Hu2022].
 
@@ -40,6 +41,10 @@ mod outline;
 mod paint;
 mod svg;
 
+mod parts;
+mod side_by_side;
+mod tiling;
+
 mod error;
 
 use espalier_model::{Branches, Embedding, Report, Tree, ViewHierarchy};
@@ -54,6 +59,7 @@ use palette::PageColors;
 pub use params::{ColorBy, Compass, Params, Style, Theme, Unit};
 use raster::{Drawn, Job, Pixel};
 use scene::Scene;
+pub use side_by_side::{Panel, Section, SideBySide, side_by_side};
 use text::Face;
 
 /// The pictures of a tree.
@@ -114,8 +120,14 @@ pub fn render(
 
     let pixels = artist.draw(&map);
     let title = params.title.as_deref().unwrap_or("planar map of a tree");
-    let content =
-        svg::Content { tree, branches: artist.branches, scene: &map.scene, coloring: artist.coloring, title };
+    let content = svg::Content {
+        tree,
+        branches: artist.branches,
+        scene: &map.scene,
+        coloring: artist.coloring,
+        title,
+        prefix: "",
+    };
     let layers = || layers::Layers::new(tree, artist.branches, embedding, (&map.page, &pixels)).encode();
     Ok(Rendered {
         png: artist.png(&map, &pixels)?,

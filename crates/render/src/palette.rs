@@ -65,6 +65,13 @@ impl Palette {
         Self { table: NAMES.map(rgb).to_vec(), is_continuous: false }
     }
 
+    /// Grey for what all parts have in common, then unordered colours for the parts.
+    pub(crate) fn parts(theme: Theme) -> Self {
+        let grey = if theme == Theme::Dark { 0xb4_b8c0 } else { 0x8a_8f98 };
+        let table = std::iter::once(grey).chain(NAMES).map(rgb).collect();
+        Self { table, is_continuous: false }
+    }
+
     /// The same colours in `n` flat steps.
     pub(crate) fn in_steps(&self, n: usize) -> Self {
         let position = |i: usize| if n > 1 { i as f32 / (n - 1) as f32 } else { 0.5 };
@@ -117,6 +124,8 @@ pub(crate) struct PageColors {
     pub soft: Rgb,
     /// The outline of the branches, towards which their colour fades at the rim.
     pub rim: Rgb,
+    /// What must not be overlooked, such as a crossing.
+    pub alarm: Rgb,
 }
 
 impl PageColors {
@@ -128,12 +137,14 @@ impl PageColors {
                 ink: rgb(0x1a_1c20),
                 soft: rgb(0x5a_5f68),
                 rim: rgb(0x2b_2a33),
+                alarm: rgb(0xd0_021b),
             },
             Theme::Dark => Self {
                 background: rgb(0x11_1317),
                 ink: rgb(0xf2_f3f5),
                 soft: rgb(0xa7_acb5),
                 rim: rgb(0x08_090b),
+                alarm: rgb(0xff_4d4d),
             },
         }
     }

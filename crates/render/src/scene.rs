@@ -26,11 +26,12 @@ pub(crate) struct Scene {
 impl Scene {
     /// The embedded tree; z is 0 everywhere.
     pub(crate) fn planar(tree: &Tree, embedding: &Embedding, width_scale: f64) -> Result<Self, Error> {
-        Self::new(
-            tree,
-            embedding.positions_mm.iter().map(|position| position.extend(0.0)).collect(),
-            width_scale,
-        )
+        Self::flat(tree, &embedding.positions_mm, width_scale)
+    }
+
+    /// The tree with its nodes at these places; z is 0 everywhere.
+    pub(crate) fn flat(tree: &Tree, positions_mm: &[DVec2], width_scale: f64) -> Result<Self, Error> {
+        Self::new(tree, positions_mm.iter().map(|position| position.extend(0.0)).collect(), width_scale)
     }
 
     /// The tree in space, as an orthographic view sees it.

@@ -39,6 +39,8 @@ pub(crate) struct Content<'a> {
     pub coloring: &'a Coloring,
     /// What the document is called.
     pub title: &'a str,
+    /// What the ids of this tree begin with; empty unless the document shows several.
+    pub prefix: &'a str,
 }
 
 /// Writes the document.
@@ -63,19 +65,25 @@ pub(crate) fn svg(content: &Content<'_>, page: &Page, groups: &[Group], colors: 
         hex(colors.background)
     );
     tree(&mut out, content, page, colors);
-    for group in groups {
-        let _ = writeln!(out, "<g id=\"{}\" font-family=\"{FONTS}\">", group.name);
-        for mark in &group.marks {
-            write_mark(&mut out, mark);
-        }
-        out.push_str("</g>\n");
-    }
+    write_groups(&mut out, groups);
     out.push_str("</svg>\n");
     out
 }
 
+/// Marks in named groups.
+pub(crate) fn write_groups(out: &mut String, groups: &[Group]) {
+    for group in groups {
+        let _ = writeln!(out, "<g id=\"{}\" font-family=\"{FONTS}\">", group.name);
+        for mark in &group.marks {
+            write_mark(out, mark);
+        }
+        out.push_str("</g>\n");
+    }
+}
+
 /// The branches, thick over thin as in the raster; of equals the parent over the starts of its children.
-fn tree(out: &mut String, content: &Content<'_>, page: &Page, colors: &PageColors) {
+pub(crate) fn tree(out: &mut String, content: &Content<'_>, page: &Page, colors: &PageColors) {
+    let prefix = content.prefix;
     let list = content.branches.list();
     if list.is_empty() {
         let center = page.px(content.scene.points_mm[0].truncate());
@@ -83,7 +91,7 @@ fn tree(out: &mut String, content: &Content<'_>, page: &Page, colors: &PageColor
         let fill = hex(content.coloring.palette.at(content.coloring.ends[0][0]));
         let _ = writeln!(
             out,
-            "<circle id=\"root\" cx=\"{:.2}\" cy=\"{:.2}\" r=\"{radius:.2}\" fill=\"{fill}\"/>",
+            "<circle id=\"{prefix}root\" cx=\"{:.2}\" cy=\"{:.2}\" r=\"{radius:.2}\" fill=\"{fill}\"/>",
             center.x, center.y
         );
         return;
@@ -95,14 +103,14 @@ fn tree(out: &mut String, content: &Content<'_>, page: &Page, colors: &PageColor
         let rim = hex(colors.rim);
         let _ = writeln!(
             out,
-            "<g id=\"edges\" stroke=\"{rim}\" stroke-opacity=\"0.75\" stroke-width=\"1.3\" stroke-linejoin=\"round\">"
+            "<g id=\"{prefix}edges\" stroke=\"{rim}\" stroke-opacity=\"0.75\" stroke-width=\"1.3\" stroke-linejoin=\"round\">"
         );
         for branch in &order {
-            let _ = writeln!(out, "<use xlink:href=\"#branch-{branch}\"/>");
+            let _ = writeln!(out, "<use xlink:href=\"#{prefix}branch-{branch}\"/>");
         }
         out.push_str("</g>\n");
     }
-    out.push_str("<g id=\"branches\">\n");
+    let _ = writeln!(out, "<g id=\"{prefix}branches\">");
     for &branch in &order {
         write_branch(out, content, page, (branch, &list[branch]));
     }
@@ -115,7 +123,7 @@ fn write_branch(
     page: &Page,
     (branch_idx, branch): (usize, &Branch),
 ) {
-    let (tree, scene) = (content.tree, content.scene);
+    let (tree, scene, prefix) = (content.tree, content.scene, content.prefix);
     let (mut value, mut length) = (0.0, 0.0);
     for node in branch.nodes.clone() {
         let edge = tree.edge_length_mm(node);
@@ -139,7 +147,7 @@ fn write_branch(
     let parent = branch.parent.map_or_else(String::new, |parent| format!(" data-parent=\"{parent}\""));
     let _ = writeln!(
         out,
-        "<path id=\"branch-{branch_idx}\" data-branch=\"{branch_idx}\"{parent} data-generation=\"{}\" \
+        "<path id=\"{prefix}branch-{branch_idx}\" data-branch=\"{branch_idx}\"{parent} data-generation=\"{}\" \
          data-strahler=\"{}\" data-nodes=\"{} {}\" data-length-mm=\"{length:.6}\" data-radius-mm=\"{:.6}\" {paint}/>",
         branch.generation,
         branch.strahler,

@@ -25,7 +25,7 @@ mod recovery;
 
 use espalier_geom::angle::{heading, wrap};
 use espalier_geom::math;
-use espalier_model::{View, ViewHierarchy};
+use espalier_model::{Termination, View, ViewHierarchy};
 use glam::{DVec2, DVec3};
 
 use crate::choices::MarinoView;
@@ -51,6 +51,7 @@ pub(crate) fn layout(problem: &Problem, views: &ViewHierarchy, params: &MarinoPa
         positions: place::from_headings(problem, &recovered.heading_rad),
         evaluations: recovered.n_tried,
         trace: Vec::new(),
+        termination: Termination::Constructed,
     }
 }
 

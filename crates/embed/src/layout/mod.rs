@@ -16,7 +16,7 @@ pub(crate) mod radial;
 pub(crate) mod start;
 mod step;
 
-use espalier_model::TracePoint;
+use espalier_model::{Termination, TracePoint};
 use glam::DVec2;
 
 /// A layout as a method leaves it, before pose and rounding.
@@ -29,11 +29,19 @@ pub(crate) struct Layout {
     pub(crate) evaluations: u64,
     /// The convergence curve; empty for constructive methods.
     pub(crate) trace: Vec<TracePoint>,
+    /// Why the method ended, were its layout to win.
+    pub(crate) termination: Termination,
 }
 
 impl Layout {
     /// The layout of a method that does not search.
     pub(crate) fn constructed(name: &str, positions: Vec<DVec2>) -> Self {
-        Self { name: name.to_owned(), positions, evaluations: 0, trace: Vec::new() }
+        Self {
+            name: name.to_owned(),
+            positions,
+            evaluations: 0,
+            trace: Vec::new(),
+            termination: Termination::Constructed,
+        }
     }
 }

@@ -12,7 +12,7 @@
 //! **Cost** particles · iterations evaluations at most, 24 bytes per particle and ratio.
 
 use espalier_geom::random::{Purpose, Stream};
-use espalier_model::TracePoint;
+use espalier_model::{Termination, TracePoint};
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -70,6 +70,7 @@ pub(crate) fn layout(
         positions: energy.positions(&swarm.global_best),
         evaluations: swarm.evaluations,
         trace: swarm.trace,
+        termination: Termination::BudgetSpent,
     })
 }
 
@@ -89,7 +90,13 @@ fn targets_met(
         crossings: 0,
     };
     report(&point, params, progress);
-    Layout { name, positions: energy.positions(targets), evaluations: 1, trace: vec![point] }
+    Layout {
+        name,
+        positions: energy.positions(targets),
+        evaluations: 1,
+        trace: vec![point],
+        termination: Termination::Optimal,
+    }
 }
 
 fn name(params: &PsoParams) -> String {

@@ -100,6 +100,8 @@ impl Params {
             targets: TargetMode::Projected,
             w_placement: 0.0,
             method: Method::Pso,
+            // The paper takes the sides that its local planes show.
+            solver: SolverParams { mirrors: false, ..SolverParams::default() },
             pso: PsoParams::paper(),
             ..Self::default()
         }

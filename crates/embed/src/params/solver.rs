@@ -3,6 +3,8 @@
 use espalier_model::diagnose::ParamError;
 use serde::{Deserialize, Serialize};
 
+use crate::choices::KeepOut;
+
 /// Our optimiser, part by part.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -22,11 +24,23 @@ pub struct SolverParams {
     /// How near edges may come that are not neighbours, as a share of the median edge length, 0 to 10. Default
     /// 0.05. Never more than a fifth of the path between them.
     pub clearance: f64,
+    /// Whether branches are kept from curling back beside the root's branch, as the exact bends of a bronchial tree
+    /// would make them do: the search for sides prices what enters the third of the plane behind the root. Default
+    /// `auto`: where the tree has a trunk, since a tree that leaves its root in all directions has no behind.
+    pub root_keep_out: KeepOut,
 }
 
 impl Default for SolverParams {
     fn default() -> Self {
-        Self { mirrors: true, untangling: true, descent: true, barrier: true, effort: 1.0, clearance: 0.05 }
+        Self {
+            mirrors: true,
+            untangling: true,
+            descent: true,
+            barrier: true,
+            effort: 1.0,
+            clearance: 0.05,
+            root_keep_out: KeepOut::Auto,
+        }
     }
 }
 

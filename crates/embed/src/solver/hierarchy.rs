@@ -56,6 +56,8 @@ pub(crate) struct Hierarchy {
     nodes: Vec<Node>,
     /// Both ends of each edge, the parent's first, as the leaf has them.
     edges: Vec<Segment>,
+    /// For the question at hand: upright boxes of nodes with several pieces below them.
+    mixed: Vec<Box2>,
     stack: Vec<(u32, u32)>,
     /// Boxes and pairs of edges looked at so far.
     pub(crate) n_looked: u64,
@@ -72,6 +74,7 @@ impl Hierarchy {
             n_leaves,
             nodes: vec![empty; 2 * n_leaves],
             edges: vec![Segment { a: DVec2::ZERO, b: DVec2::ZERO }; n_edges],
+            mixed: vec![Box2::EMPTY; 2 * n_leaves],
             stack: Vec::new(),
             n_looked: 0,
         };
@@ -177,6 +180,7 @@ impl Hierarchy {
         margin_mm: f64,
         mut visit: impl FnMut(&Pair) -> bool,
     ) -> bool {
+        self.mix(1, pieces, window);
         let mut stack = std::mem::take(&mut self.stack);
         stack.clear();
         stack.push((1, 1));
@@ -189,13 +193,17 @@ impl Hierarchy {
             }
             self.n_looked += 1;
             let (piece_a, piece_b) = (pieces.whole(&of_a), pieces.whole(&of_b));
-            if let (Some(piece_a), Some(piece_b)) = (piece_a, piece_b) {
-                let is_apart = || {
-                    let motions = (&pieces.motions[piece_a], &pieces.motions[piece_b]);
-                    let (box_a, box_b) = (&self.nodes[a].bounds, &self.nodes[b].bounds);
-                    box_a.moved(motions.0).is_apart(&box_b.moved(motions.1), margin_mm)
+            if let (Some(piece_a), Some(piece_b)) = (piece_a, piece_b)
+                && pieces.move_together(piece_a, piece_b)
+            {
+                continue;
+            }
+            if a != b {
+                let bounds = |node: usize, piece: Option<usize>| match piece {
+                    Some(piece) => self.nodes[node].bounds.moved(&pieces.motions[piece]),
+                    None => self.mixed[node],
                 };
-                if pieces.move_together(piece_a, piece_b) || (a != b && is_apart()) {
+                if bounds(a, piece_a).is_apart(&bounds(b, piece_b), margin_mm) {
                     continue;
                 }
             }
@@ -220,6 +228,32 @@ impl Hierarchy {
         goes_on
     }
 
+    /// Finds the boxes of nodes with several pieces below them, from a node down; the upright box of the node. Goes
+    /// down log N levels.
+    fn mix(&mut self, node: usize, pieces: &Pieces, window: &Range<usize>) -> Box2 {
+        let own = clip(self.range(node), window);
+        if own.is_empty() {
+            return Box2::EMPTY;
+        }
+        if let Some(piece) = pieces.whole(&own) {
+            return self.nodes[node].bounds.moved(&pieces.motions[piece]).upright();
+        }
+        self.n_looked += 1;
+        let bounds = if node >= self.n_leaves {
+            let (from, to) = (own.start.max(1), own.end);
+            let moved = |edge: usize| moved(&self.edges[edge], &pieces.motions[pieces.of(edge)]);
+            let ends = (from..to).map(moved).flat_map(|edge| [edge.a, edge.b]);
+            if from < to { Box2::of_points(ends, DVec2::X) } else { Box2::EMPTY }
+        } else {
+            self.hand_down(node);
+            let (first, second) =
+                (self.mix(2 * node, pieces, window), self.mix(2 * node + 1, pieces, window));
+            first.joined_upright(&second)
+        };
+        self.mixed[node] = bounds;
+        bounds
+    }
+
     /// Which of two nodes to look into: one of many pieces, else the larger one.
     fn is_first_opened(
         &self,
@@ -232,7 +266,7 @@ impl Hierarchy {
         match (piece_a, piece_b) {
             (None, Some(_)) => true,
             (Some(_), None) => false,
-            _ => self.nodes[a].bounds.half.element_sum() >= self.nodes[b].bounds.half.element_sum(),
+            _ => self.nodes[a].bounds.size() >= self.nodes[b].bounds.size(),
         }
     }
 
@@ -330,6 +364,26 @@ impl Box2 {
             }
         }
         best
+    }
+
+    /// The upright box around this one.
+    fn upright(&self) -> Self {
+        let axis = self.axis.abs();
+        let half = DVec2::new(
+            axis.x * self.half.x + axis.y * self.half.y,
+            axis.y * self.half.x + axis.x * self.half.y,
+        );
+        if self.is_empty() { *self } else { Self { center: self.center, axis: DVec2::X, half } }
+    }
+
+    /// The box around two upright boxes.
+    fn joined_upright(&self, other: &Self) -> Self {
+        if self.is_empty() || other.is_empty() {
+            return if other.is_empty() { *self } else { *other };
+        }
+        let low = (self.center - self.half).min(other.center - other.half);
+        let high = (self.center + self.half).max(other.center + other.half);
+        Self { center: 0.5 * (low + high), axis: DVec2::X, half: 0.5 * (high - low) }
     }
 
     /// Half the girth, so that thin boxes compare too.

@@ -1,18 +1,23 @@
-//! Our solver: from a crossing-free start to the least energy, crossing-free all the way.
+//! Our solver: from a crossing-free start to the least energy.
 //!
-//! | file | what |
-//! |---|---|
-//! | `shape` | a layout by its ratios |
-//! | `untangling` | a start: the targets themselves, untangled from the tips to the root |
-//! | `descent` | ratios towards 0, a few at a time |
-//! | `barrier/…` | all ratios at once, under a barrier |
-//! | `linkage`, `joint`, `deviation` | a layout as a linkage: what a change of some ratios moves, gains and hits |
-//! | `hierarchy`, `similarity` | boxes over subtrees that move as a whole |
-//! | `grid` | edges by cells: who may be near whom |
-//! | `work` | the budget |
+//! | step | file | what |
+//! |--:|---|---|
+//! | 1 | `mirrors/` | before any method: the side of each turn, at exact lengths and bends |
+//! | 2 | `untangling` | a second start beside the cone: the targets, bent no more than it takes |
+//! | 3 | `descent` | ratios towards 0, a few at a time, through other branches if need be |
+//! | 4 | `barrier/` | all ratios at once, under a barrier that keeps branches apart |
+//! | | `shape`, `work` | a layout by its ratios; the budget |
+//! | | `linkage`, `joint`, `deviation` | a layout as a linkage: what a change of some ratios moves, gains and hits |
+//! | | `hierarchy`, `similarity`, `grid` | who may be near whom: boxes over subtrees that move as a whole, cells |
 //!
-//! **Input** the problem and the cone. **Output** a layout without crossings.
+//! **Input** the problem, and crossing-free headings. **Output** a layout without crossings, why the search ended,
+//! and the curve of its energy.
+//! **Steps** Where the targets themselves do not cross there is nothing to do. Else both starts, each on a thread of
+//! its own: descend; then barrier and descent in turn until a round gains less than 3 %. The better one wins.
+//! **Guarantees** every shape that is kept is free of crossings, and the energy of each start never rises; the same
+//! result for any number of threads, since the starts know nothing of each other.
 //! **Source** ours; the energy is Eq. 4 of [Hu2022].
+//! **Cost** `WORK_PER_EDGE` units for an edge and start at most, times the effort.
 
 mod barrier;
 #[cfg(test)]
@@ -23,19 +28,131 @@ mod grid;
 mod hierarchy;
 mod joint;
 mod linkage;
+pub(crate) mod mirrors;
 mod shape;
 mod similarity;
 mod untangling;
 mod work;
 
+use espalier_model::{Termination, TracePoint};
+
 use crate::layout::Layout;
-use crate::params::Params;
+use crate::params::{Params, SolverParams};
 use crate::problem::Problem;
+use crate::separation::Separation;
+use crate::{crossing, energy};
 pub(crate) use shape::Shape;
 pub(crate) use work::Work;
 
+/// Units of work that a start may take, for each edge.
+const WORK_PER_EDGE: u64 = 150_000;
+/// What one descent may take of the work: where much has to be moved the barrier is faster.
+const DESCENT_SHARE: f64 = 0.05;
+/// A round of barrier and descent that gains less than this share of the energy is the last.
+const LEAST_GAIN: f64 = 0.03;
+
 /// Lays the problem's tree flat; `cone` are the headings of the cone start.
-pub(crate) fn layout(problem: &Problem, cone: &[f64], _params: &Params) -> Layout {
-    let shape = Shape::from_headings(problem, cone);
-    Layout::constructed("solver", shape.positions(problem))
+pub(crate) fn layout(problem: &Problem, cone: &[f64], params: &Params) -> Layout {
+    let separation = Separation::new(problem, params.solver.clearance);
+    let targets = Shape::targets(problem);
+    if crossing::is_planar(problem, &targets.positions(problem)) {
+        let mut run = Run::new(problem, &params.solver, targets);
+        run.record();
+        return run.into_layout(Termination::Optimal);
+    }
+    let cone = Shape::from_headings(problem, cone);
+    let improve = |start: &dyn Fn(&mut Work) -> Shape| {
+        let mut run = Run::new(problem, &params.solver, cone.clone());
+        run.shape = start(&mut run.work);
+        run.improve(&separation);
+        run
+    };
+    let (from_cone, from_targets) = rayon::join(
+        || improve(&|_| cone.clone()),
+        || {
+            let untangled = |work: &mut Work| untangling::untangle(problem, &separation, &cone, work);
+            params.solver.untangling.then(|| improve(&untangled))
+        },
+    );
+    let best = match from_targets {
+        Some(other) if other.energy() <= from_cone.energy() => other,
+        _ => from_cone,
+    };
+    let is_spent = best.work.is_spent();
+    best.into_layout(if is_spent { Termination::BudgetSpent } else { Termination::Converged })
+}
+
+/// One start on its way.
+struct Run<'a> {
+    problem: &'a Problem<'a>,
+    params: &'a SolverParams,
+    shape: Shape,
+    work: Work,
+    trace: Vec<TracePoint>,
+}
+
+impl<'a> Run<'a> {
+    fn new(problem: &'a Problem<'a>, params: &'a SolverParams, shape: Shape) -> Self {
+        let limit = params.effort * (WORK_PER_EDGE * problem.n_nodes() as u64) as f64;
+        Self { problem, params, shape, work: Work::up_to(limit as u64), trace: Vec::new() }
+    }
+
+    /// Descends; then barrier and descent in turn, as long as it pays.
+    fn improve(&mut self, separation: &Separation) {
+        self.record();
+        self.descend(separation);
+        while self.params.barrier && !self.work.is_spent() {
+            let before = self.energy();
+            self.keep_if_better(|run| {
+                barrier::relax(run.problem, separation, &mut run.shape, &mut run.work);
+            });
+            self.descend(separation);
+            if before - self.energy() < LEAST_GAIN * before {
+                break;
+            }
+        }
+    }
+
+    fn descend(&mut self, separation: &Separation) {
+        if self.params.descent {
+            self.keep_if_better(|run| {
+                let mut slice = run.work.slice(DESCENT_SHARE);
+                descent::descend(run.problem, separation, &mut run.shape, &mut slice);
+                run.work.add(slice);
+            });
+        }
+    }
+
+    /// Descent knows nothing of placement, so what it gains may be lost there.
+    fn keep_if_better(&mut self, step: impl FnOnce(&mut Self)) {
+        let (kept, before) = (self.shape.clone(), self.energy());
+        step(self);
+        if self.energy() >= before {
+            self.shape = kept;
+        }
+        self.record();
+    }
+
+    fn energy(&self) -> f64 {
+        energy::score(self.problem, &self.shape.positions(self.problem), 0.0, 0).energy.total()
+    }
+
+    fn record(&mut self) {
+        self.trace.push(TracePoint {
+            iteration: self.trace.len() as u32,
+            evaluations: self.work.done,
+            energy: self.energy(),
+            crossings: 0,
+        });
+    }
+
+    fn into_layout(self, termination: Termination) -> Layout {
+        Layout {
+            name: "solver".to_owned(),
+            positions: self.shape.positions(self.problem),
+            evaluations: self.work.done,
+            trace: self.trace,
+            termination,
+        }
+    }
 }

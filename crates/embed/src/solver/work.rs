@@ -15,6 +15,16 @@ impl Work {
         Self { done: 0, limit }
     }
 
+    /// A part of the budget, as a share of the whole, but no more than what is left.
+    pub(crate) fn slice(&self, share: f64) -> Self {
+        Self::up_to(((self.limit as f64 * share) as u64).min(self.limit.saturating_sub(self.done)))
+    }
+
+    /// Counts what a slice has spent.
+    pub(crate) fn add(&mut self, slice: Self) {
+        self.done += slice.done;
+    }
+
     /// Counts units.
     pub(crate) fn spend(&mut self, units: usize) {
         self.done += units as u64;

@@ -60,6 +60,7 @@ impl Termination {
         match self {
             Self::Constructed => "constructed",
             Self::Optimal => "optimal",
+            Self::Converged => "converged",
             Self::BudgetSpent => "budget-spent",
         }
     }
@@ -159,6 +160,7 @@ enum TargetKindFile {
 enum TerminationFile {
     Constructed,
     Optimal,
+    Converged,
     BudgetSpent,
 }
 
@@ -464,7 +466,7 @@ macro_rules! same_variants {
 same_fields!(Energy, EnergyFile { length, angle, side, placement, crossing });
 same_fields!(TracePoint, TracePointFile { iteration, evaluations, energy, crossings });
 same_variants!(TargetKind, TargetKindFile { Intrinsic, Projected, IntrinsicMirrored, ProjectedMirrored });
-same_variants!(Termination, TerminationFile { Constructed, Optimal, BudgetSpent });
+same_variants!(Termination, TerminationFile { Constructed, Optimal, Converged, BudgetSpent });
 
 #[cfg(test)]
 mod tests {

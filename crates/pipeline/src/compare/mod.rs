@@ -1,0 +1,3 @@
+//! Methods, or runs, side by side.
+
+pub(crate) mod figure;

@@ -1,0 +1,521 @@
+//! The layouts of several methods beside the tree in space, in one figure.
+//!
+//! **Input** for each tree its global view and the layouts of its methods. **Output** PNG and SVG.
+//! **Steps** 1. Each tree is a section: its view in space, then its layouts, tiled in rows at one scale. 2. Main
+//! subtrees have the same colours in every panel. 3. Crossings get rings; of a cluster, as many as do not hide it. 4. Below each panel its row of the table in
+//! short; what is best among the section's layouts without crossings is set bold. 5. Scale bar and key end a section.
+//! **Guarantees** the same bytes for any number of threads. Where radii would cover a panel several times over, the
+//! section shows lines.
+//! **Source** figures of section 5 of [Hu2022]. **Cost** that of as many small pictures.
+
+use std::fmt::Write as _;
+
+use espalier_model::{Branches, MethodRow, Tree, View};
+use glam::DVec2;
+
+use crate::coloring::Coloring;
+use crate::drawing::{Group, Mark};
+use crate::furniture::{self, Heading};
+use crate::kinship::Kinship;
+use crate::page::{MAX_PIXELS, Page, Pen};
+use crate::palette::{PageColors, hex};
+use crate::params::{Compass, Params, Style};
+use crate::raster::{self, Drawn, Job, Pixel};
+use crate::scene::Scene;
+use crate::text::{Anchor, Face};
+use crate::tiling::{Room, Tiling};
+use crate::{Error, MAX_LAYERS, heading, paint, parts, sketch, svg};
+
+/// Sizes in layout units: font sizes of panel titles and notes, the least panel, the space between panels.
+const TITLE: f64 = 1.5;
+const NOTE: f64 = 1.12;
+const LEAST_PANEL: f64 = 21.0;
+const GAP: f64 = 2.2;
+/// Space around a tree in its panel, in layout units.
+const RIM: f64 = 2.2;
+/// Line height over font size.
+const LEADING: f64 = 1.4;
+/// Height of the key below a section, in layout units.
+const KEY: f64 = 5.0;
+/// Height of all panels over the width of the page: a figure as wide as a screen.
+const MOST_HEIGHT: f64 = 0.75;
+/// From this many on, the rings of crossings are smaller, so as not to hide the tree.
+const MANY_CROSSINGS: usize = 40;
+/// Edges in small panels are at least this share of `min_width_px` wide.
+const PANEL_PEN: f64 = 0.7;
+/// Lines of notes below a panel.
+const N_NOTES: usize = 4;
+
+/// A tree with the layouts of its methods.
+#[derive(Clone, Debug)]
+pub struct Section<'a> {
+    /// What to call it, if there are several.
+    pub name: Option<&'a str>,
+    /// The tree.
+    pub tree: &'a Tree,
+    /// Its global view.
+    pub view: &'a View,
+    /// Letters at the edges of the view.
+    pub compass: Compass,
+    /// The layouts, in the order in which they are shown.
+    pub panels: Vec<Panel<'a>>,
+}
+
+/// A method's layout.
+#[derive(Clone, Debug)]
+pub struct Panel<'a> {
+    /// Its row of the table.
+    pub row: &'a MethodRow,
+    /// Where each node lies, plane mm.
+    pub positions_mm: &'a [DVec2],
+    /// Pairs of edges that cross, each by its lower node.
+    pub crossings: Vec<(usize, usize)>,
+    /// Whether it became the embedding.
+    pub is_chosen: bool,
+}
+
+/// The figure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SideBySide {
+    /// As PNG, sRGB, 8 bits.
+    pub png: Vec<u8>,
+    /// As SVG; ids of branches begin with the panel's number.
+    pub svg: String,
+}
+
+/// Draws trees, each in space and by the layouts of its methods.
+///
+/// # Errors
+/// [`Error`] if a parameter is out of range, a layout is another tree's, a number cannot be drawn, or the figure would
+/// be over 2²⁵ pixels.
+pub fn side_by_side(sections: &[Section<'_>], params: &Params) -> Result<SideBySide, Error> {
+    params.validate()?;
+    let artist = Artist { params, face: Face::built_in()?, colors: PageColors::of(params.theme) };
+    let sheet = artist.lay_out(sections)?;
+    let (width, height) = (params.width_px, sheet.height_px as u32);
+    if u64::from(width) * u64::from(height) > MAX_PIXELS {
+        return Err(Error::TooLarge { width, height, limit: MAX_PIXELS });
+    }
+    let mut pixels = vec![Pixel::EMPTY; width as usize * height as usize];
+    for frame in &sheet.frames {
+        artist.draw(frame, &mut pixels);
+    }
+    let page = Page { width, height, ..artist.page(DVec2::ZERO, DVec2::ONE, 1.0) };
+    let png = paint::png(&page, &pixels, &sheet.groups, (artist.colors.background, &artist.face))?;
+    Ok(SideBySide { png, svg: artist.svg(&sheet, height) })
+}
+
+/// A panel in its place.
+struct Frame<'a> {
+    tree: &'a Tree,
+    branches: std::rc::Rc<Branches>,
+    coloring: std::rc::Rc<Coloring>,
+    scene: Scene,
+    /// The page as the whole figure sees it: `area` is the panel's.
+    page: Page,
+    has_depth: bool,
+}
+
+/// The figure, laid out.
+struct Sheet<'a> {
+    frames: Vec<Frame<'a>>,
+    groups: Vec<Group>,
+    height_px: f64,
+}
+
+struct Artist<'a> {
+    params: &'a Params,
+    face: Face,
+    colors: PageColors,
+}
+
+impl Artist<'_> {
+    fn unit_px(&self) -> f64 {
+        Page::unit_px(self.params.width_px)
+    }
+
+    fn margin_px(&self) -> f64 {
+        Page::margin_px(self.params.width_px)
+    }
+
+    /// A page whose tree has this area and scale.
+    fn page(&self, low: DVec2, high: DVec2, px_per_mm: f64) -> Page {
+        Page {
+            width: self.params.width_px,
+            height: 0,
+            unit_px: self.unit_px(),
+            px_per_mm,
+            origin_px: low,
+            area: [low, high],
+            key_at: low,
+            pen: Pen { min_width_px: PANEL_PEN * self.params.min_width_px, style: self.params.style },
+        }
+    }
+
+    fn lay_out<'t>(&self, sections: &[Section<'t>]) -> Result<Sheet<'t>, Error> {
+        let said = Heading {
+            title: self.params.title.clone(),
+            verdict: vec!["methods side by side, all at one scale and scored by one energy".to_owned()],
+            facts: Vec::new(),
+        };
+        let (group, heading_px) = furniture::heading(&self.face, &said, self.params.width_px, &self.colors);
+        let mut sheet =
+            Sheet { frames: Vec::new(), groups: vec![group], height_px: self.margin_px() + heading_px };
+        let share = MOST_HEIGHT / sections.len().max(1) as f64;
+        for section in sections {
+            self.lay_out_section(section, share, &mut sheet)?;
+        }
+        sheet.height_px += self.margin_px();
+        Ok(sheet)
+    }
+
+    /// Adds a section; `share` of the page's width is the height that its panels may have.
+    fn lay_out_section<'t>(
+        &self,
+        section: &Section<'t>,
+        share: f64,
+        sheet: &mut Sheet<'t>,
+    ) -> Result<(), Error> {
+        let unit = self.unit_px();
+        sheet.height_px += unit;
+        if let Some(name) = section.name {
+            sheet.height_px += LEADING * TITLE * unit;
+            let at = DVec2::new(self.margin_px(), sheet.height_px);
+            let name = self.text(at, TITLE, self.colors.ink, name);
+            sheet.groups.push(Group { name: "section", marks: vec![strong(name)] });
+            sheet.height_px += 0.8 * unit;
+        }
+        let scenes = self.scenes(section)?;
+        let sizes_mm: Vec<DVec2> =
+            scenes.iter().map(Scene::bounds_mm).map(|(low, high)| high - low).collect();
+        let room = Room {
+            width_px: f64::from(self.params.width_px) - 2.0 * self.margin_px(),
+            height_px: share * f64::from(self.params.width_px),
+            least_px: LEAST_PANEL * unit,
+            gap_px: GAP * unit,
+            text_px: (LEADING * (TITLE + N_NOTES as f64 * NOTE) + GAP) * unit,
+            rim_px: RIM * unit,
+        };
+        let tiling = Tiling::of(&sizes_mm, &room);
+        let first_frame = sheet.frames.len();
+        let branches = std::rc::Rc::new(section.tree.branches());
+        let coloring = std::rc::Rc::new(parts::color(section.tree, &branches, self.params.theme));
+        let mut scenes = scenes.into_iter().enumerate();
+        for row_mm in sizes_mm.chunks(tiling.n_columns) {
+            let row_px = tiling.row_px(row_mm, &room);
+            let top = sheet.height_px + LEADING * TITLE * unit;
+            for (column, (panel_idx, scene)) in scenes.by_ref().take(row_mm.len()).enumerate() {
+                let left = self.margin_px() + column as f64 * (tiling.panel_px + room.gap_px);
+                let low = DVec2::new(left, top).floor();
+                let page = self.panel_page(&scene, low, DVec2::new(tiling.panel_px, row_px), &tiling);
+                let (tree, has_depth) = (section.tree, panel_idx == 0);
+                let frame = Frame {
+                    tree,
+                    branches: branches.clone(),
+                    coloring: coloring.clone(),
+                    scene,
+                    page,
+                    has_depth,
+                };
+                sheet.groups.push(self.panel_marks(section, &frame, panel_idx));
+                sheet.frames.push(frame);
+            }
+            sheet.height_px += row_px + room.text_px;
+        }
+        self.thin_if_needed(&mut sheet.frames[first_frame..]);
+        if let Some(first) = sheet.frames.get(first_frame) {
+            let at = DVec2::new(self.margin_px(), sheet.height_px - 0.5 * GAP * unit);
+            let has_crossings = section.panels.iter().any(|panel| !panel.crossings.is_empty());
+            sheet.groups.extend(self.key(&first.page, at, has_crossings));
+            sheet.height_px += KEY * unit;
+        }
+        Ok(())
+    }
+
+    /// The tree in space, then its layouts.
+    fn scenes(&self, section: &Section<'_>) -> Result<Vec<Scene>, Error> {
+        let width_scale = self.params.width_scale;
+        let mut scenes = vec![Scene::seen(section.tree, section.view, width_scale)?];
+        for panel in &section.panels {
+            let (n_entries, n_nodes) = (panel.positions_mm.len(), section.tree.n_nodes());
+            if n_entries != n_nodes {
+                return Err(Error::Mismatch { what: "positions", n_entries, n_nodes });
+            }
+            scenes.push(Scene::flat(section.tree, panel.positions_mm, width_scale)?);
+        }
+        Ok(scenes)
+    }
+
+    /// The page of a panel: the tree in the middle of its area.
+    fn panel_page(&self, scene: &Scene, low: DVec2, size: DVec2, tiling: &Tiling) -> Page {
+        let page = self.page(low, low + size, tiling.px_per_mm);
+        let (low_mm, high_mm) = scene.bounds_mm();
+        let center_mm = 0.5 * (low_mm + high_mm);
+        let center_px = low + 0.5 * size;
+        Page { origin_px: center_px - tiling.px_per_mm * DVec2::new(center_mm.x, -center_mm.y), ..page }
+    }
+
+    /// All panels of a section become lines if the radii would cover one of them too often.
+    fn thin_if_needed(&self, frames: &mut [Frame<'_>]) {
+        let is_thick = |frame: &Frame<'_>| {
+            let (local, kinship) = (local(&frame.page), kinship(frame));
+            let page = Page { pen: Pen { style: Style::PseudoSurface, ..local.pen }, ..local };
+            let drawn = sketch::edges(frame.tree, &frame.scene, &page, &frame.coloring, &kinship);
+            raster::layers(size_of(&page), &drawn) > MAX_LAYERS
+        };
+        if self.params.style == Style::PseudoSurface && frames.iter().any(is_thick) {
+            for frame in frames {
+                frame.page.pen.style = Style::Line;
+            }
+        }
+    }
+
+    fn draw(&self, frame: &Frame<'_>, pixels: &mut [Pixel]) {
+        let page = local(&frame.page);
+        let kinship = kinship(frame);
+        let drawn: Vec<Drawn> = sketch::edges(frame.tree, &frame.scene, &page, &frame.coloring, &kinship);
+        let size = size_of(&page);
+        let panel = raster::rasterise(&Job {
+            size,
+            drawn: &drawn,
+            kinship: &kinship,
+            palette: &frame.coloring.palette,
+            colors: self.colors,
+            style: page.pen.style,
+            has_depth: frame.has_depth,
+        });
+        let width = self.params.width_px as usize;
+        let corner = [frame.page.area[0].x as usize, frame.page.area[0].y as usize];
+        let n_columns = size[0].min(width - corner[0]);
+        for (row, line) in panel.chunks(size[0]).enumerate() {
+            let start = (corner[1] + row) * width + corner[0];
+            if let Some(target) = pixels.get_mut(start..start + n_columns) {
+                target.copy_from_slice(&line[..n_columns]);
+            }
+        }
+    }
+
+    /// Title, notes, root and crossings of a panel.
+    fn panel_marks(&self, section: &Section<'_>, frame: &Frame<'_>, panel_idx: usize) -> Group {
+        let unit = self.unit_px();
+        let [low, high] = frame.page.area;
+        let root = furniture::root_mark(&frame.page, frame.tree, &frame.scene, &self.colors);
+        let mut marks: Vec<Mark> =
+            root.marks.into_iter().filter(|mark| matches!(mark, Mark::Ring { .. })).collect();
+        let panel = panel_idx.checked_sub(1).map(|idx| &section.panels[idx]);
+        if let Some(panel) = panel {
+            let (radius, width) =
+                if panel.crossings.len() < MANY_CROSSINGS { (0.6, 0.2) } else { (0.4, 0.13) };
+            let points = panel
+                .crossings
+                .iter()
+                .map(|&pair| frame.page.px(crossing_point(frame.tree, panel.positions_mm, pair)));
+            marks.extend(apart(points, 0.8 * radius * unit).into_iter().map(|center| Mark::Ring {
+                center,
+                radius_px: radius * unit,
+                width_px: width * unit,
+                color: self.colors.alarm,
+            }));
+        } else {
+            let view = section.view;
+            let axes = [view.up.cross(view.towards_camera), view.up];
+            let around = self.around_tree(frame);
+            let compass = furniture::compass(&around, axes, section.compass, &self.colors);
+            marks.extend(compass.into_iter().flat_map(|group| group.marks));
+        }
+        let (title, notes) = match panel {
+            Some(panel) => {
+                let chosen = if panel.is_chosen { "  (the map)" } else { "" };
+                (format!("{}{chosen}", panel.row.method), notes(section, panel.row))
+            }
+            None => (
+                "in space, from the global view".to_owned(),
+                heading::size_of(frame.tree, &frame.branches, self.params)
+                    .into_iter()
+                    .map(|text| (text, false))
+                    .collect(),
+            ),
+        };
+        let at = DVec2::new(low.x, low.y - 0.45 * TITLE * unit);
+        marks.push(strong(self.text(at, TITLE, self.colors.ink, &title)));
+        for (line, (text, is_best)) in notes.into_iter().take(N_NOTES).enumerate() {
+            let at = DVec2::new(low.x, high.y + (LEADING * (line as f64 + 0.9) * NOTE) * unit);
+            let color = if is_best { self.colors.ink } else { self.colors.soft };
+            let mark = self.text(at, NOTE, color, &text);
+            marks.push(if is_best { strong(mark) } else { mark });
+        }
+        Group { name: "panel", marks }
+    }
+
+    /// The panel's page with its area drawn close around the tree.
+    fn around_tree(&self, frame: &Frame<'_>) -> Page {
+        let (low_mm, high_mm) = frame.scene.bounds_mm();
+        let rim = DVec2::splat(RIM * self.unit_px());
+        let low = frame.page.px(DVec2::new(low_mm.x, high_mm.y)) - rim;
+        let high = frame.page.px(DVec2::new(high_mm.x, low_mm.y)) + rim;
+        // Letters to the left and right need more room than those above and below.
+        let side = DVec2::new(1.5 * rim.x, 0.0);
+        let [panel_low, panel_high] = frame.page.area;
+        Page { area: [(low - side).max(panel_low), (high + side).min(panel_high)], ..frame.page }
+    }
+
+    /// Scale bar and what the marks mean.
+    fn key(&self, page: &Page, at: DVec2, has_crossings: bool) -> Vec<Group> {
+        let unit = self.unit_px();
+        let mut groups = Vec::new();
+        groups.extend(furniture::scale_bar(page, at, self.params, &self.colors));
+        let mut texts = vec![
+            "same colour = same subtree".to_owned(),
+            "bold = best of the layouts without crossings".to_owned(),
+        ];
+        let mut marks = Vec::new();
+        let mut left = at + DVec2::new(14.0 * unit, 2.9 * unit);
+        if has_crossings {
+            texts.insert(0, "crossing".to_owned());
+            marks.push(Mark::Ring {
+                center: left + DVec2::new(0.6, -0.4) * unit,
+                radius_px: 0.6 * unit,
+                width_px: 0.2 * unit,
+                color: self.colors.alarm,
+            });
+            left.x += 1.8 * unit;
+        }
+        let room = f64::from(self.params.width_px) - self.margin_px() - left.x;
+        for (line, text) in self.face.lines(&texts, (NOTE * unit) as f32, room as f32).iter().enumerate() {
+            let at = left + DVec2::new(0.0, line as f64 * LEADING * NOTE * unit);
+            marks.push(self.text(at, NOTE, self.colors.soft, text));
+        }
+        groups.push(Group { name: "key", marks });
+        groups
+    }
+
+    fn text(&self, at: DVec2, size: f64, color: crate::palette::Rgb, text: &str) -> Mark {
+        let size_px = size * self.unit_px();
+        Mark::Text { at, size_px, anchor: Anchor::Start, is_strong: false, color, text: text.to_owned() }
+    }
+
+    fn svg(&self, sheet: &Sheet<'_>, height: u32) -> String {
+        let (width, title) =
+            (self.params.width_px, self.params.title.as_deref().unwrap_or("methods side by side"));
+        let mut out = String::new();
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            out,
+            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" \
+             xmlns:xlink=\"http://www.w3.org/1999/xlink\" version=\"1.1\" width=\"{width}\" height=\"{height}\" \
+             viewBox=\"0 0 {width} {height}\" data-format=\"espalier-compare-svg\" data-version=\"1\">\n\
+             <title>{}</title>\n<rect id=\"background\" width=\"{width}\" height=\"{height}\" fill=\"{}\"/>",
+            svg::escaped(title),
+            hex(self.colors.background)
+        );
+        for (panel_idx, frame) in sheet.frames.iter().enumerate() {
+            let prefix = format!("panel-{panel_idx}-");
+            let content = svg::Content {
+                tree: frame.tree,
+                branches: &frame.branches,
+                scene: &frame.scene,
+                coloring: &frame.coloring,
+                title,
+                prefix: &prefix,
+            };
+            svg::tree(&mut out, &content, &frame.page, &self.colors);
+        }
+        svg::write_groups(&mut out, &sheet.groups);
+        out.push_str("</svg>\n");
+        out
+    }
+}
+
+fn strong(mark: Mark) -> Mark {
+    match mark {
+        Mark::Text { at, size_px, anchor, color, text, .. } => {
+            Mark::Text { at, size_px, anchor, is_strong: true, color, text }
+        }
+        other => other,
+    }
+}
+
+/// The page of a panel in the panel's own pixels.
+fn local(page: &Page) -> Page {
+    let [low, high] = page.area;
+    let size = (high - low).ceil().max(DVec2::ONE);
+    Page {
+        width: size.x as u32,
+        height: size.y as u32,
+        origin_px: page.origin_px - low,
+        area: [DVec2::ZERO, size],
+        ..*page
+    }
+}
+
+fn size_of(page: &Page) -> [usize; 2] {
+    [page.width as usize, page.height as usize]
+}
+
+fn kinship(frame: &Frame<'_>) -> Kinship {
+    Kinship::new(frame.tree, &frame.branches, &frame.scene, frame.page.px_per_mm)
+}
+
+/// What is said below a layout, each with whether it is the best of its section.
+fn notes(section: &Section<'_>, row: &MethodRow) -> Vec<(String, bool)> {
+    let planar = || section.panels.iter().map(|panel| panel.row).filter(|row| row.crossings == 0);
+    // What reads alike is equally good.
+    let note = |of: &dyn Fn(&MethodRow) -> f64, say: &dyn Fn(f64) -> String, rest: String| {
+        let least = planar().map(of).fold(f64::INFINITY, f64::min);
+        let said = say(of(row));
+        let is_best = row.crossings == 0 && said == say(least);
+        (format!("{said}{rest}"), is_best)
+    };
+    let losses = &row.losses;
+    let crossings = match row.crossings {
+        0 => note(
+            &|row| row.energy.total(),
+            &|energy| format!("no crossings, energy {}", crate::unit::text(energy, 3)),
+            String::new(),
+        ),
+        1 => ("1 crossing".to_owned(), false),
+        n => (format!("{n} crossings"), false),
+    };
+    vec![
+        crossings,
+        note(
+            &|row| row.losses.angle3d_error_mean_deg,
+            &|mean| format!("angles off by {}", heading::degrees(mean)),
+            format!(", max {}", heading::degrees(losses.angle3d_error_max_deg)),
+        ),
+        note(
+            &|row| row.losses.length_loss_mean,
+            &|mean| format!("lengths off by {}", heading::percent(mean)),
+            format!(", max {}", heading::percent(losses.length_loss_max)),
+        ),
+        note(
+            &|row| row.losses.stress,
+            &|stress| format!("stress {stress:.3}"),
+            format!(", clearance {:.3} edges", losses.clearance_min_edges),
+        ),
+    ]
+}
+
+/// Those of the points, the first first, that are not nearer than `least_px` to one taken before: rings upon rings
+/// would hide the tree.
+fn apart(points: impl Iterator<Item = DVec2>, least_px: f64) -> Vec<DVec2> {
+    let mut taken: Vec<DVec2> = Vec::new();
+    for point in points {
+        if taken.iter().all(|other| other.distance_squared(point) >= least_px * least_px) {
+            taken.push(point);
+        }
+    }
+    taken
+}
+
+/// Where two edges cross; the middle between their midpoints where they are parallel.
+fn crossing_point(tree: &Tree, positions: &[DVec2], (a, b): (usize, usize)) -> DVec2 {
+    let ends = |node: usize| (positions[tree.parent(node).unwrap_or(0)], positions[node]);
+    let ((a0, a1), (b0, b1)) = (ends(a), ends(b));
+    let (along_a, along_b) = (a1 - a0, b1 - b0);
+    let across = along_a.perp_dot(along_b);
+    if across.abs() <= 1e-12 * along_a.length() * along_b.length() {
+        return 0.25 * (a0 + a1 + b0 + b1);
+    }
+    a0 + along_a * ((b0 - a0).perp_dot(along_b) / across).clamp(0.0, 1.0)
+}
