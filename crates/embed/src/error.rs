@@ -56,6 +56,37 @@ pub enum Error {
         /// The other edge of it.
         second: usize,
     },
+    /// Manual edits that leave crossings.
+    #[error(
+        "with {} pinned {} crossings are left, the first between edges {first} and {second}{}",
+        edit_names(holding), crossings,
+        if *can_move { "" } else { ", which nothing that is free can part" }
+    )]
+    Edits {
+        /// The edits between the edges that cross, from 0.
+        holding: Vec<usize>,
+        /// The crossings left.
+        crossings: usize,
+        /// An edge of the first, by its lower node.
+        first: usize,
+        /// The other edge of it.
+        second: usize,
+        /// Whether between every two edges that cross something may move; if not, no layout with these pins is free
+        /// of crossings.
+        can_move: bool,
+    },
+    /// Edits for another tree, by its digest.
+    #[error("the edits were made for another tree")]
+    EditsOfOtherTree,
+}
+
+/// `edits[0], edits[2] and edits[3]`.
+fn edit_names(edits: &[usize]) -> String {
+    let names: Vec<String> = edits.iter().map(|idx| format!("edits[{idx}]")).collect();
+    match names.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
+        _ => names.concat(),
+    }
 }
 
 impl Diagnose for Error {
@@ -66,15 +97,19 @@ impl Diagnose for Error {
             Self::Scale { .. } => "E-EMBED-SCALE",
             Self::Memory { .. } => "E-EMBED-MEMORY",
             Self::Uncertified { .. } => "E-EMBED-UNCERTIFIED",
+            Self::Edits { .. } => "E-EMBED-EDITS",
+            Self::EditsOfOtherTree => "E-EMBED-EDITS-TREE",
         }
     }
 
     fn class(&self) -> Class {
         match self {
             Self::Param(error) => error.class(),
-            Self::OtherTree | Self::Views { .. } | Self::Scale { .. } => Class::Input,
+            Self::OtherTree | Self::Views { .. } | Self::Scale { .. } | Self::EditsOfOtherTree => {
+                Class::Input
+            }
             Self::Memory { .. } => Class::Limit,
-            Self::Uncertified { .. } => Class::Uncertified,
+            Self::Uncertified { .. } | Self::Edits { .. } => Class::Uncertified,
         }
     }
 
@@ -85,6 +120,13 @@ impl Diagnose for Error {
             Self::Scale { .. } => "check the unit of the input".to_owned(),
             Self::Memory { .. } => {
                 "lower `particles`, choose `freedom = \"s\"` or raise `memory_mib`".to_owned()
+            }
+            Self::Edits { can_move: true, .. } => {
+                "turn these branches less, or raise solver.effort for a longer search".to_owned()
+            }
+            Self::Edits { .. } => "turn one of these branches by another angle".to_owned(),
+            Self::EditsOfOtherTree => {
+                "make them anew: numbers of branches and nodes are of one tree only".to_owned()
             }
             Self::Uncertified { .. } => {
                 "edge lengths that span more than ten decades cannot be told apart in twelve digits: merge \

@@ -10,6 +10,7 @@
 //! | 6 | `certify`, `overlap` | the exact certificate; overlaps of the drawn tubes |
 //! | 7 | `energy`, `losses/…`, `distances` | the one energy and all losses, for every method alike |
 //! | 8 | `select` | the best certified layout, and the table of all |
+//! | 9 | `replay`, `pins` | manual edits in it: branches turned and pinned, the rest laid around them |
 //!
 //! **Cost** Targets, radial, cone, pose and energy are linear in N. The certificate sorts and sweeps, N log N on
 //! layouts that fill their box. Distances take a fixed 1.1 million pairs. The swarm takes particles · iterations
@@ -39,6 +40,7 @@ mod place;
 mod pose;
 mod problem;
 mod ratio;
+mod replay;
 mod select;
 mod separation;
 mod siblings;
@@ -46,7 +48,7 @@ mod solver;
 mod targets;
 mod weights;
 
-use espalier_model::{Comparison, Embedding, Report, Tree, ViewHierarchy};
+use espalier_model::{Comparison, Edits, Embedding, Report, Tree, ViewHierarchy};
 
 pub use certify::{certify, crossing_pairs};
 pub use choices::{CrossingWeight, Freedom, KeepOut, MarinoView, Method, PoseMode, Pull, Start, TargetMode};
@@ -139,7 +141,27 @@ pub fn embed(
     seed: u64,
     events: &(dyn Fn(Event) + Sync),
 ) -> Result<Embedded, Error> {
+    embed_edited((tree, views), &Edits::none(tree), params, seed, events)
+}
+
+/// As [`embed`], and makes manual edits in the layout that it gives: branches are turned by hand and pinned, crossings
+/// that this brings about are removed, and all else is optimised around them. [`Embedding::edits`] lists what came of
+/// each.
+///
+/// # Errors
+/// As [`embed`]; edits of another tree; and [`Error::Edits`] where no layout without crossings was found that keeps
+/// what they pin.
+pub fn embed_edited(
+    (tree, views): (&Tree, &ViewHierarchy),
+    edits: &Edits,
+    params: &Params,
+    seed: u64,
+    events: &(dyn Fn(Event) + Sync),
+) -> Result<Embedded, Error> {
     params.validate()?;
+    if edits.tree() != tree.digest() {
+        return Err(Error::EditsOfOtherTree);
+    }
     let length_mm = tree.length_mm();
     if tree.n_nodes() > 1 && !(1e-60..=1e60).contains(&length_mm) {
         return Err(Error::Scale { length_mm });
@@ -150,7 +172,7 @@ pub fn embed(
     let problem = problem::Problem::new(tree, branches, targets, params);
     let (problem, mirrors_report) = solver::mirrors::mirrored(problem, params, seed);
     let layouts = select::run_methods(&problem, views, params, seed, events)?;
-    let mut embedded = select::select(&problem, layouts, params, seed)?;
+    let mut embedded = select::select(&problem, layouts, edits, (params, seed))?;
     embedded.report.extend(mirrors_report);
     embedded.report.extend(weights_report);
     Ok(embedded)

@@ -58,6 +58,19 @@ impl Drawn {
     }
 }
 
+impl Drawn {
+    /// What a shape draws; pinned turns keep their bits.
+    pub(crate) fn by(problem: &Problem, shape: &Shape) -> Self {
+        let mut drawn =
+            Self { turn_rad: vec![0.0; problem.n_nodes()], length_mm: vec![0.0; problem.n_nodes()] };
+        for node in 1..problem.n_nodes() {
+            drawn.turn_rad[node] = shape.turn_rad(problem, node);
+            drawn.length_mm[node] = shape.length_mm(problem, node);
+        }
+        drawn
+    }
+}
+
 impl Pins {
     /// Nothing is pinned.
     pub(crate) fn none(problem: &Problem) -> Self {
@@ -82,6 +95,21 @@ pub(crate) fn around<'a>(problem: &Problem<'a>, drawn: &Drawn, pins: &Pins) -> (
             set_lengths(&mut pinned, segment, &drawn.length_mm, pins.length[segment]);
     }
     (pinned, shape)
+}
+
+/// The problem whose targets are what a shape draws: to leave that costs what the same ratios cost elsewhere.
+pub(crate) fn held<'a>(problem: &Problem<'a>, shape: &Shape) -> Problem<'a> {
+    let mut held = problem.clone();
+    for node in 1..problem.n_nodes() {
+        let turn_rad = shape.turn_rad(problem, node);
+        held.targets.angle_rad[node] = PI + turn_rad;
+        held.bend[node] = turn_rad.abs();
+        if turn_rad != 0.0 {
+            held.side[node] = turn_rad.signum();
+        }
+        held.targets.length_mm[node] = shape.length_mm(problem, node);
+    }
+    held
 }
 
 fn set_angle(problem: &mut Problem, node: usize, turn_rad: f64, is_pinned: bool) {

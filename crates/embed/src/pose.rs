@@ -64,7 +64,21 @@ pub(crate) fn pose(problem: &Problem, positions: &[DVec2], mode: PoseMode) -> Po
         PoseMode::Auto | PoseMode::View => as_seen_rad,
         PoseMode::RootOnTop => hanging_rad(problem, &posed).unwrap_or(as_seen_rad),
     };
-    let turn = math::unit_vector(rotation_rad);
+    let pose = Pose { rotation_rad, is_reflected };
+    turned_and_rounded(posed, pose)
+}
+
+/// Moves a layout as another was moved, so that what both have in common lies in the same place.
+pub(crate) fn posed_like(positions: &[DVec2], pose: Pose) -> Posed {
+    let moved = |&p: &DVec2| {
+        let p = p - positions[0];
+        if pose.is_reflected { reflected(p) } else { p }
+    };
+    turned_and_rounded(positions.iter().map(moved).collect(), pose)
+}
+
+fn turned_and_rounded(mut posed: Vec<DVec2>, pose: Pose) -> Posed {
+    let turn = math::unit_vector(pose.rotation_rad);
     posed.iter_mut().for_each(|p| *p = turn.rotate(*p));
 
     let extent = posed.iter().fold(0.0_f64, |extent, p| extent.max(p.x.abs()).max(p.y.abs()));
@@ -73,7 +87,7 @@ pub(crate) fn pose(problem: &Problem, positions: &[DVec2], mode: PoseMode) -> Po
         *p = DVec2::new(round(p.x, decimals), round(p.y, decimals));
     }
     let quantum_mm = format!("1e-{decimals}").parse().unwrap_or(1.0);
-    Posed { positions: posed, pose: Pose { rotation_rad, is_reflected }, quantum_mm }
+    Posed { positions: posed, pose, quantum_mm }
 }
 
 /// Whether the mirror image agrees better with the view, by more than rounding can.

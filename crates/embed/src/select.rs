@@ -3,18 +3,20 @@
 //! **Input** the problem, params, seed. **Output** `Embedded`.
 //! **Steps** 1. Run the methods. 2. Each layout gets its pose and is rounded. 3. Exact certificate, energy, losses.
 //! 4. The winner: for an optimiser the certified layout of least energy, whoever made it; of equal ones, its own. For a
-//! constructive method that method, or if it has crossings the certified layout of least energy.
+//! constructive method that method, or if it has crossings the certified layout of least energy. 5. Manual edits are
+//! made in it (see `replay`); the result is then the edited layout, one more row of the comparison.
 //! **Guarantees** the result is certified, and under an optimiser never worse than any certified layout that ran. Every
 //! layout is scored from its coordinates as written, in the handedness of the targets (see `pose`).
 //! **Cost** dominated by the swarm.
 
 use espalier_model::{
-    Certificate, ComparedLayout, Comparison, Embedding, Losses, MethodRow, Report, TargetKind, Termination,
-    TracePoint, ViewHierarchy,
+    Certificate, ComparedLayout, Comparison, EditRecord, Edits, Embedding, Losses, MethodRow, Report,
+    TargetKind, Termination, TracePoint, ViewHierarchy,
 };
+use glam::DVec2;
 use rayon::prelude::*;
 
-use crate::choices::{Method, PoseMode};
+use crate::choices::Method;
 use crate::distances::SpaceDistances;
 use crate::energy::{self, Scored};
 use crate::error::Error;
@@ -22,6 +24,7 @@ use crate::layout::{Layout, cone, marino, projection, pso, radial};
 use crate::params::Params;
 use crate::pose::{self, Posed};
 use crate::problem::Problem;
+use crate::replay;
 use crate::{Embedded, Event, certify, losses, overlap, place, solver};
 
 /// Every layout that the params ask for, by method, each method once, in a fixed order.
@@ -85,6 +88,8 @@ const EQUAL: f64 = 1e-12;
 struct Judged {
     method: Method,
     name: String,
+    /// As the method left it: before pose and rounding.
+    drawn: Vec<DVec2>,
     posed: Posed,
     certificate: Certificate,
     scored: Scored,
@@ -99,47 +104,95 @@ fn judge(
     (problem, space): (&Problem, &SpaceDistances),
     method: Method,
     layout: Layout,
-    mode: PoseMode,
+    posed: Posed,
 ) -> Judged {
-    let posed = pose::pose(problem, &layout.positions, mode);
     let certificate = certify::certify(problem.tree, &posed.positions);
     let unreflected = posed.unreflected();
     let scored = energy::score(problem, &unreflected, posed.quantum_mm, certificate.crossings);
     let mut losses = losses::losses(problem, &unreflected);
     (losses.stress, losses.spearman) = space.compare(&posed.positions);
     let overlaps = overlap::count(problem, &posed.positions);
-    let Layout { name, evaluations, trace, termination, .. } = layout;
-    Judged { method, name, posed, certificate, scored, losses, overlaps, evaluations, trace, termination }
+    let Layout { name, evaluations, trace, termination, positions: drawn } = layout;
+    Judged {
+        method,
+        name,
+        drawn,
+        posed,
+        certificate,
+        scored,
+        losses,
+        overlaps,
+        evaluations,
+        trace,
+        termination,
+    }
 }
 
-/// Judges the layouts and takes the best.
+/// A layout with manual edits made, in the pose that it had: what is not edited stays where it is.
+fn edited(
+    (problem, space): (&Problem, &SpaceDistances),
+    winner: &Judged,
+    edits: &Edits,
+    params: &Params,
+) -> Result<(Judged, Vec<EditRecord>), Error> {
+    let base = replay::Base {
+        positions: &winner.drawn,
+        is_reflected: winner.posed.pose.is_reflected,
+        quantum_mm: winner.posed.quantum_mm,
+        energy: winner.scored.energy.total(),
+    };
+    let mut replayed = replay::replay(problem, &base, edits.list(), params)?;
+    let posed = pose::posed_like(&replayed.positions, winner.posed.pose);
+    let name = format!("{}, edited", winner.name);
+    let layout = Layout {
+        name,
+        positions: replayed.positions.clone(),
+        evaluations: replayed.work,
+        trace: Vec::new(),
+        termination: replayed.termination,
+    };
+    let edited = judge((problem, space), winner.method, layout, posed);
+    if !edited.certificate.holds() {
+        return Err(replay::conflict(problem, edits.list(), &edited.certificate));
+    }
+    replay::measure(problem, &mut replayed, &edited.posed, edited.scored.energy.total());
+    Ok((edited, replayed.records))
+}
+
+/// Judges the layouts, takes the best, and makes the edits in it.
 pub(crate) fn select(
     problem: &Problem,
     layouts: Vec<(Method, Layout)>,
-    params: &Params,
-    seed: u64,
+    edits: &Edits,
+    (params, seed): (&Params, u64),
 ) -> Result<Embedded, Error> {
     let space = SpaceDistances::new(problem.tree);
     let mut judged: Vec<Judged> = layouts
         .into_par_iter()
-        .map(|(method, layout)| judge((problem, &space), method, layout, params.pose))
+        .map(|(method, layout)| {
+            let posed = pose::pose(problem, &layout.positions, params.pose);
+            judge((problem, &space), method, layout, posed)
+        })
         .collect();
+    let mut chosen = winner(&judged, params.method)?;
+    let mut report = report(problem, &judged, &judged[chosen], params.method);
+    let mut records = Vec::new();
+    if !edits.list().is_empty() {
+        let made = edited((problem, &space), &judged[chosen], edits, params)?;
+        report.extend(edits_report(&made));
+        records = made.1;
+        chosen = judged.len();
+        judged.push(made.0);
+    }
     let layouts: Vec<ComparedLayout> =
         judged.iter().map(|judged| compared(judged, problem.targets.kind)).collect();
     let methods = layouts.iter().map(|layout| layout.row.clone()).collect();
-    let winner_idx = winner(&judged, params.method)?;
-    let comparison = Comparison {
-        tree: problem.tree.digest(),
-        targets: problem.targets.digest(),
-        seed,
-        chosen: winner_idx,
-        layouts,
-    };
-    let report = report(problem, &judged, &judged[winner_idx], params.method);
-
     let asked = judged.iter().find(|judged| judged.method == params.method);
     let trace = asked.map(|judged| judged.trace.clone()).unwrap_or_default();
-    let Judged { name, posed, certificate, scored, losses, termination, .. } = judged.swap_remove(winner_idx);
+    let comparison =
+        Comparison { tree: problem.tree.digest(), targets: problem.targets.digest(), seed, chosen, layouts };
+
+    let Judged { name, posed, certificate, scored, losses, termination, .. } = judged.swap_remove(chosen);
     let is_lossless = scored.energy.length + scored.energy.angle == 0.0;
     let termination = if is_lossless { Termination::Optimal } else { termination };
     let embedding = Embedding {
@@ -158,9 +211,17 @@ pub(crate) fn select(
         termination,
         trace,
         methods,
-        edits: Vec::new(),
+        edits: records,
     };
     Ok(Embedded { embedding, comparison, report })
+}
+
+fn edits_report((edited, records): &(Judged, Vec<EditRecord>)) -> Report {
+    let mut report = Report::default();
+    report.count_usize("edits", records.len());
+    report.count_usize("edits_crossings_removed", records.iter().map(|r| r.crossings_removed).sum());
+    report.count("energy_edited", edited.scored.energy.total());
+    report
 }
 
 /// The index of the layout to use.

@@ -9,6 +9,7 @@
 //! | | `shape`, `work` | a layout by its ratios; the budget |
 //! | | `linkage`, `joint`, `deviation` | a layout as a linkage: what a change of some ratios moves, gains and hits |
 //! | | `hierarchy`, `similarity`, `grid` | who may be near whom: boxes over subtrees that move as a whole, cells |
+//! | | `repair` | manual edits: a layout of which a part is pinned, freed of crossings |
 //!
 //! **Input** the problem, and crossing-free headings. **Output** a layout without crossings, why the search ended,
 //! and the curve of its energy.
@@ -29,6 +30,7 @@ mod hierarchy;
 mod joint;
 mod linkage;
 pub(crate) mod mirrors;
+mod repair;
 mod shape;
 mod similarity;
 mod untangling;
@@ -41,6 +43,7 @@ use crate::params::{Params, SolverParams};
 use crate::problem::Problem;
 use crate::separation::Separation;
 use crate::{crossing, energy};
+pub(crate) use repair::repair;
 pub(crate) use shape::Shape;
 pub(crate) use work::Work;
 
