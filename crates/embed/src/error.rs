@@ -56,6 +56,18 @@ pub enum Error {
         /// The other edge of it.
         second: usize,
     },
+    /// The result is worse than another layout of the same run, which must never be.
+    #[error("the layout by {method} has the energy {energy}, that by {other} {least}")]
+    Worse {
+        /// The method of the result.
+        method: String,
+        /// Its energy.
+        energy: f64,
+        /// The method of the better layout.
+        other: String,
+        /// The energy of that.
+        least: f64,
+    },
     /// Manual edits that leave crossings.
     #[error(
         "with {} pinned {} crossings are left, the first between edges {first} and {second}{}",
@@ -99,6 +111,7 @@ impl Diagnose for Error {
             Self::Uncertified { .. } => "E-EMBED-UNCERTIFIED",
             Self::Edits { .. } => "E-EMBED-EDITS",
             Self::EditsOfOtherTree => "E-EMBED-EDITS-TREE",
+            Self::Worse { .. } => "E-EMBED-WORSE",
         }
     }
 
@@ -110,6 +123,7 @@ impl Diagnose for Error {
             }
             Self::Memory { .. } => Class::Limit,
             Self::Uncertified { .. } | Self::Edits { .. } => Class::Uncertified,
+            Self::Worse { .. } => Class::Internal,
         }
     }
 
@@ -133,6 +147,7 @@ impl Diagnose for Error {
                  the shortest edges (tree resampling)"
                     .to_owned()
             }
+            Self::Worse { .. } => "please report this with the tree".to_owned(),
         }
     }
 }

@@ -9,7 +9,7 @@
 //! | 5 | `pose` | one rigid motion of the whole, mirrored or not; rounding to what is written |
 //! | 6 | `certify`, `overlap` | the exact certificate; overlaps of the drawn tubes |
 //! | 7 | `energy`, `losses/…`, `distances` | the one energy and all losses, for every method alike |
-//! | 8 | `select` | the best certified layout, and the table of all |
+//! | 8 | `select`, `never_worse` | the best certified layout, and the table of all; the last look at it |
 //! | 9 | `replay`, `pins` | manual edits in it: branches turned and pinned, the rest laid around them |
 //!
 //! **Cost** Targets, radial, cone, pose and energy are linear in N. The certificate sorts and sweeps, N log N on
@@ -32,6 +32,7 @@ mod energy;
 mod error;
 mod layout;
 mod losses;
+mod never_worse;
 mod overlap;
 mod params;
 mod paths;
@@ -170,9 +171,13 @@ pub fn embed_edited(
     let weights_report = weights::check(tree, &branches, params)?;
     let targets = targets::targets(tree, &branches, views, params.targets)?;
     let problem = problem::Problem::new(tree, branches, targets, params);
-    let (problem, mirrors_report) = solver::mirrors::mirrored(problem, params, seed);
-    let layouts = select::run_methods(&problem, views, params, seed, events)?;
-    let mut embedded = select::select(&problem, layouts, edits, (params, seed))?;
+    let (mirrored, mirrors_report) = solver::mirrors::mirrored(&problem, params, seed);
+    let problems = select::Problems {
+        frozen: mirrored.as_ref().unwrap_or(&problem),
+        unflipped: mirrored.is_some().then_some(&problem),
+    };
+    let layouts = select::run_methods(problems, views, params, seed, events)?;
+    let mut embedded = select::select(problems, layouts, edits, (params, seed))?;
     embedded.report.extend(mirrors_report);
     embedded.report.extend(weights_report);
     Ok(embedded)

@@ -20,21 +20,41 @@ use crate::choices::Method;
 use crate::distances::SpaceDistances;
 use crate::energy::{self, Scored};
 use crate::error::Error;
-use crate::layout::{Layout, cone, marino, projection, pso, radial};
+use crate::layout::{Aim, Layout, cone, marino, projection, pso, radial};
 use crate::params::Params;
 use crate::pose::{self, Posed};
 use crate::problem::Problem;
 use crate::replay;
-use crate::{Embedded, Event, certify, losses, overlap, place, solver};
+use crate::{Embedded, Event, certify, losses, never_worse, overlap, place, solver};
+
+/// The problems of a run.
+#[derive(Clone, Copy)]
+pub(crate) struct Problems<'a> {
+    /// With the targets that are frozen for the run: every method aims at them.
+    pub(crate) frozen: &'a Problem<'a>,
+    /// With the targets of the local planes as they are, where sides were searched.
+    pub(crate) unflipped: Option<&'a Problem<'a>>,
+}
+
+impl<'a> Problems<'a> {
+    /// What a layout is scored against.
+    fn of(&self, aim: Aim) -> &'a Problem<'a> {
+        match (aim, self.unflipped) {
+            (Aim::Unflipped, Some(unflipped)) => unflipped,
+            _ => self.frozen,
+        }
+    }
+}
 
 /// Every layout that the params ask for, by method, each method once, in a fixed order.
 pub(crate) fn run_methods(
-    problem: &Problem,
+    problems: Problems,
     views: &ViewHierarchy,
     params: &Params,
     seed: u64,
     events: &(dyn Fn(Event) + Sync),
 ) -> Result<Vec<(Method, Layout)>, Error> {
+    let problem = problems.frozen;
     let wants = |method: Method| params.method == method || params.methods.contains(&method);
     let placed =
         |name: &str, headings: &[f64]| Ok(Layout::constructed(name, place::from_headings(problem, headings)));
@@ -57,15 +77,29 @@ pub(crate) fn run_methods(
         let marino = || Ok(marino::layout(problem, views, &params.marino));
         layouts.push(announced(events, Method::Marino, marino)?);
     }
-    if wants(Method::Pso) {
+    if wants(Method::Pso) && !is_too_large_for_swarm(problem, params) {
         let progress = |progress| events(Event::Searching(progress));
         let swarm = || pso::layout(problem, (&radial, &cone), (&params.pso, seed), &progress);
         layouts.push(announced(events, Method::Pso, swarm)?);
+        // The same swarm with the sides as the paper has them: what the searched sides are worth to it.
+        if let Some(unflipped) = problems.unflipped.filter(|unflipped| pso::targets_cross(unflipped)) {
+            let starts = (radial::headings(unflipped), cone::headings(unflipped));
+            let swarm = || {
+                let layout = pso::layout(unflipped, (&starts.0, &starts.1), (&params.pso, seed), &progress)?;
+                Ok(Layout { aim: Aim::Unflipped, ..layout })
+            };
+            layouts.push(announced(events, Method::Pso, swarm)?);
+        }
     }
     if wants(Method::Solver) {
         layouts.push(announced(events, Method::Solver, || Ok(solver::layout(problem, &cone, params)))?);
     }
     Ok(layouts)
+}
+
+/// Whether a swarm that is only there to compare is left out.
+fn is_too_large_for_swarm(problem: &Problem, params: &Params) -> bool {
+    params.method != Method::Pso && problem.n_nodes() > params.pso.max_nodes as usize
 }
 
 /// Runs a method between the events of its beginning and its end.
@@ -79,10 +113,6 @@ fn announced(
     events(Event::Finished { name: layout.name.clone() });
     Ok((method, layout))
 }
-
-/// Energies are equal if they differ by no more than this, or than this share of the larger: 1e-12 is the energy
-/// of ratios of a millionth, which rounding can leave.
-const EQUAL: f64 = 1e-12;
 
 /// A layout as it is written, with all that is said about it.
 struct Judged {
@@ -98,6 +128,8 @@ struct Judged {
     evaluations: u64,
     trace: Vec<TracePoint>,
     termination: Termination,
+    aim: Aim,
+    targets: TargetKind,
 }
 
 fn judge(
@@ -112,7 +144,8 @@ fn judge(
     let mut losses = losses::losses(problem, &unreflected);
     (losses.stress, losses.spearman) = space.compare(&posed.positions);
     let overlaps = overlap::count(problem, &posed.positions);
-    let Layout { name, evaluations, trace, termination, positions: drawn } = layout;
+    let Layout { name, evaluations, trace, termination, positions: drawn, aim } = layout;
+    let targets = problem.targets.kind;
     Judged {
         method,
         name,
@@ -125,6 +158,8 @@ fn judge(
         evaluations,
         trace,
         termination,
+        aim,
+        targets,
     }
 }
 
@@ -150,6 +185,7 @@ fn edited(
         evaluations: replayed.work,
         trace: Vec::new(),
         termination: replayed.termination,
+        aim: Aim::Frozen,
     };
     let edited = judge((problem, space), winner.method, layout, posed);
     if !edited.certificate.holds() {
@@ -161,21 +197,23 @@ fn edited(
 
 /// Judges the layouts, takes the best, and makes the edits in it.
 pub(crate) fn select(
-    problem: &Problem,
+    problems: Problems,
     layouts: Vec<(Method, Layout)>,
     edits: &Edits,
     (params, seed): (&Params, u64),
 ) -> Result<Embedded, Error> {
+    let problem = problems.frozen;
     let space = SpaceDistances::new(problem.tree);
     let mut judged: Vec<Judged> = layouts
         .into_par_iter()
         .map(|(method, layout)| {
+            let problem = problems.of(layout.aim);
             let posed = pose::pose(problem, &layout.positions, params.pose);
             judge((problem, &space), method, layout, posed)
         })
         .collect();
     let mut chosen = winner(&judged, params.method)?;
-    let mut report = report(problem, &judged, &judged[chosen], params.method);
+    let mut report = report(problem, &judged, &judged[chosen], params);
     let mut records = Vec::new();
     if !edits.list().is_empty() {
         let made = edited((problem, &space), &judged[chosen], edits, params)?;
@@ -184,8 +222,7 @@ pub(crate) fn select(
         chosen = judged.len();
         judged.push(made.0);
     }
-    let layouts: Vec<ComparedLayout> =
-        judged.iter().map(|judged| compared(judged, problem.targets.kind)).collect();
+    let layouts: Vec<ComparedLayout> = judged.iter().map(compared).collect();
     let methods = layouts.iter().map(|layout| layout.row.clone()).collect();
     let asked = judged.iter().find(|judged| judged.method == params.method);
     let trace = asked.map(|judged| judged.trace.clone()).unwrap_or_default();
@@ -193,8 +230,7 @@ pub(crate) fn select(
         Comparison { tree: problem.tree.digest(), targets: problem.targets.digest(), seed, chosen, layouts };
 
     let Judged { name, posed, certificate, scored, losses, termination, .. } = judged.swap_remove(chosen);
-    let is_lossless = scored.energy.length + scored.energy.angle == 0.0;
-    let termination = if is_lossless { Termination::Optimal } else { termination };
+    let termination = if is_optimal(&scored) { Termination::Optimal } else { termination };
     let embedding = Embedding {
         tree: problem.tree.digest(),
         method: name,
@@ -213,6 +249,7 @@ pub(crate) fn select(
         methods,
         edits: records,
     };
+    never_worse::check(&embedding, comparison.chosen, params.method)?;
     Ok(Embedded { embedding, comparison, report })
 }
 
@@ -224,15 +261,20 @@ fn edits_report((edited, records): &(Judged, Vec<EditRecord>)) -> Report {
     report
 }
 
+/// Whether no length and no angle is lost: nothing can be better for these targets.
+fn is_optimal(scored: &Scored) -> bool {
+    scored.energy.length + scored.energy.angle == 0.0
+}
+
 /// The index of the layout to use.
 fn winner(judged: &[Judged], asked: Method) -> Result<usize, Error> {
     let energy = |idx: usize| judged[idx].scored.energy.total();
-    let certified = (0..judged.len()).filter(|&idx| judged[idx].certificate.holds());
+    let is_candidate = |judged: &Judged| judged.certificate.holds() && judged.aim == Aim::Frozen;
+    let certified = (0..judged.len()).filter(|&idx| is_candidate(&judged[idx]));
     let best = certified.clone().min_by(|&a, &b| energy(a).total_cmp(&energy(b)));
     let as_asked = certified.clone().find(|&idx| judged[idx].method == asked);
-    let is_equal = |a: f64, b: f64| (a - b).abs() <= EQUAL * a.max(b).max(1.0);
     if let (Some(own), Some(best)) = (as_asked, best)
-        && (!asked.is_optimiser() || is_equal(energy(own), energy(best)))
+        && (!asked.is_optimiser() || never_worse::is_equal(energy(own), energy(best)))
     {
         return Ok(own);
     }
@@ -244,7 +286,7 @@ fn winner(judged: &[Judged], asked: Method) -> Result<usize, Error> {
     })
 }
 
-fn compared(judged: &Judged, targets: TargetKind) -> ComparedLayout {
+fn compared(judged: &Judged) -> ComparedLayout {
     let row = MethodRow {
         method: judged.name.clone(),
         crossings: judged.certificate.crossings,
@@ -252,12 +294,13 @@ fn compared(judged: &Judged, targets: TargetKind) -> ComparedLayout {
         energy: judged.scored.energy,
         losses: judged.losses,
         evaluations: judged.evaluations,
-        targets,
+        targets: judged.targets,
     };
     ComparedLayout { row, quantum_mm: judged.posed.quantum_mm, positions_mm: judged.posed.positions.clone() }
 }
 
-fn report(problem: &Problem, judged: &[Judged], winner: &Judged, asked: Method) -> Report {
+fn report(problem: &Problem, judged: &[Judged], winner: &Judged, params: &Params) -> Report {
+    let asked = params.method;
     let mut report = Report::default();
     report.count_usize("nodes", problem.n_nodes());
     report.count_usize("branches", problem.branches.list().len());
@@ -267,6 +310,10 @@ fn report(problem: &Problem, judged: &[Judged], winner: &Judged, asked: Method) 
     report.count("length_loss_mean", winner.losses.length_loss_mean);
     report.count("angle3d_error_mean_deg", winner.losses.angle3d_error_mean_deg);
     report.count("evaluations", judged.iter().map(|judged| judged.evaluations as f64).sum::<f64>());
+    report.count("proven_optimal", f64::from(u8::from(is_optimal(&winner.scored))));
+    if params.methods.contains(&Method::Pso) && is_too_large_for_swarm(problem, params) {
+        report.count("pso_left_out_above_nodes", params.pso.max_nodes);
+    }
     if !winner.overlaps.is_complete {
         let message = format!(
             "the mean radius is {} mm, the median edge {} mm: too many tubes overlap to count them all; check the \
@@ -289,4 +336,109 @@ fn report(problem: &Problem, judged: &[Judged], winner: &Judged, asked: Method) 
         report.warn("W-EMBED-OTHER-METHOD", message);
     }
     report
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use espalier_model::Tree;
+    use glam::DVec3;
+
+    use super::*;
+    use crate::common::{tree_of, views_along};
+    use crate::params::PsoParams;
+    use crate::targets;
+
+    /// Two arms that cross in the view but not in space.
+    fn crossing_tree() -> Tree {
+        tree_of(&[
+            (0.0, 0.0, 0.0, None),
+            (1.0, 0.0, 0.0, Some(0)),
+            (3.0, 2.0, 1.0, Some(1)),
+            (3.0, -2.0, 1.0, Some(2)),
+            (2.0, -1.0, -1.0, Some(1)),
+            (4.0, 1.0, -1.0, Some(4)),
+        ])
+    }
+
+    /// A run whose frozen targets have the second arm bend away from the first, where `is_mirrored`.
+    fn run(tree: &Tree, params: &Params, is_mirrored: bool) -> Embedded {
+        let (views, branches) = (views_along(tree, DVec3::Z), tree.branches());
+        let as_seen = targets::targets(tree, &branches, &views, params.targets).expect("targets");
+        let mut mirrored = as_seen.clone();
+        for node in [3, 5] {
+            mirrored.angle_rad[node] = TAU - mirrored.angle_rad[node];
+        }
+        mirrored.kind = TargetKind::IntrinsicMirrored;
+        let unflipped = Problem::new(tree, branches.clone(), as_seen, params);
+        let frozen = Problem::new(tree, branches, mirrored, params);
+        let problems = if is_mirrored {
+            Problems { frozen: &frozen, unflipped: Some(&unflipped) }
+        } else {
+            Problems { frozen: &unflipped, unflipped: None }
+        };
+        let layouts = run_methods(problems, &views, params, 0, &|_| {}).expect("layouts");
+        select(problems, layouts, &Edits::none(tree), (params, 0)).expect("a certified layout")
+    }
+
+    fn small() -> Params {
+        let pso = PsoParams { particles: 32, iterations: 10, ..PsoParams::default() };
+        Params { method: Method::Pso, pso, ..Params::default() }
+    }
+
+    #[test]
+    fn a_second_swarm_shows_what_searched_sides_are_worth() {
+        let tree = crossing_tree();
+        let embedded = run(&tree, &small(), true);
+        let rows = &embedded.embedding.methods;
+        let swarms: Vec<&MethodRow> = rows.iter().filter(|row| row.method.starts_with("pso")).collect();
+        assert_eq!(swarms.len(), 2);
+        assert_eq!(swarms[0].targets, TargetKind::IntrinsicMirrored);
+        assert_eq!(swarms[1].targets, TargetKind::Intrinsic);
+        assert_eq!(swarms[0].energy.angle, 0.0);
+        assert!(swarms[1].energy.length + swarms[1].energy.angle > 0.0, "those targets cross");
+        assert_eq!(embedded.embedding.targets.kind, TargetKind::IntrinsicMirrored);
+        assert_eq!(embedded.embedding.termination, Termination::Optimal);
+        assert_eq!(embedded.report.get("proven_optimal"), Some(1.0));
+
+        let embedded = run(&tree, &small(), false);
+        let rows = &embedded.embedding.methods;
+        assert_eq!(rows.iter().filter(|row| row.method.starts_with("pso")).count(), 1);
+        assert_eq!(embedded.report.get("proven_optimal"), Some(0.0));
+    }
+
+    #[test]
+    fn what_aims_at_other_targets_is_never_the_result() {
+        let tree = crossing_tree();
+        // Nothing is lost against these targets, so the second swarm would be the best of all.
+        let params = Params { w_length: 0.0, w_angle: 0.0, w_placement: 0.0, ..small() };
+        let embedded = run(&tree, &params, true);
+        let chosen = embedded.comparison.chosen;
+        assert_eq!(embedded.embedding.methods[chosen].targets, TargetKind::IntrinsicMirrored);
+    }
+
+    #[test]
+    fn large_trees_have_smaller_swarms_or_none() {
+        let pso = PsoParams::default();
+        assert_eq!([1, 300, 301, 3000, 5000].map(|n| pso.particles_for(n)), [512, 512, 510, 51, 30]);
+        assert_eq!(pso.particles_for(100_000), 16);
+        assert_eq!(PsoParams { particles: 5, ..pso }.particles_for(100_000), 5);
+        assert_eq!(PsoParams::paper().particles_for(4000), 40_960);
+
+        let tree = crossing_tree();
+        let tight = |method| {
+            let pso = PsoParams { full_size_nodes: 3, max_nodes: 5, ..small().pso };
+            run(&tree, &Params { method, pso, ..small() }, false)
+        };
+        let has_swarm =
+            |embedded: &Embedded| embedded.embedding.methods.iter().any(|row| row.method.starts_with("pso"));
+        let left_out = tight(Method::Cone);
+        assert!(!has_swarm(&left_out));
+        assert_eq!(left_out.report.get("pso_left_out_above_nodes"), Some(5.0));
+        // Asked for by name, it runs.
+        let asked = tight(Method::Pso);
+        assert!(has_swarm(&asked));
+        assert!(asked.embedding.methods.iter().any(|row| row.method == "pso 16x10 n"));
+    }
 }

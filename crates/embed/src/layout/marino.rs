@@ -25,7 +25,7 @@ mod recovery;
 
 use espalier_geom::angle::{heading, wrap};
 use espalier_geom::math;
-use espalier_model::{Termination, View, ViewHierarchy};
+use espalier_model::{View, ViewHierarchy};
 use glam::{DVec2, DVec3};
 
 use crate::choices::MarinoView;
@@ -46,12 +46,10 @@ pub(crate) fn layout(problem: &Problem, views: &ViewHierarchy, params: &MarinoPa
 
     let off_rad = seen.residuals(problem, &heading_rad);
     let recovered = recovery::recover(problem, &heading_rad, off_rad);
+    let positions = place::from_headings(problem, &recovered.heading_rad);
     Layout {
-        name: name(params.view, &recovered),
-        positions: place::from_headings(problem, &recovered.heading_rad),
         evaluations: recovered.n_tried,
-        trace: Vec::new(),
-        termination: Termination::Constructed,
+        ..Layout::constructed(&name(params.view, &recovered), positions)
     }
 }
 

@@ -31,6 +31,18 @@ pub(crate) struct Layout {
     pub(crate) trace: Vec<TracePoint>,
     /// Why the method ended, were its layout to win.
     pub(crate) termination: Termination,
+    /// Which targets it was made for, and is scored against.
+    pub(crate) aim: Aim,
+}
+
+/// The targets that a layout was made for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Aim {
+    /// Those that are frozen for the run.
+    #[default]
+    Frozen,
+    /// Those of the local planes, before sides were searched: a row beside the others, never the result.
+    Unflipped,
 }
 
 impl Layout {
@@ -42,6 +54,7 @@ impl Layout {
             evaluations: 0,
             trace: Vec::new(),
             termination: Termination::Constructed,
+            aim: Aim::Frozen,
         }
     }
 }

@@ -18,6 +18,7 @@ use rayon::prelude::*;
 
 use crate::Progress;
 use crate::batch::{BatchEnergy, CpuEnergy, DofMap, Score, Scratch};
+use crate::crossing;
 use crate::error::Error;
 use crate::layout::Layout;
 use crate::layout::start::{self, Incumbents};
@@ -25,6 +26,12 @@ use crate::layout::step::Rule;
 use crate::params::PsoParams;
 use crate::place;
 use crate::problem::Problem;
+use crate::solver::Shape;
+
+/// Whether the targets themselves have crossings, so that a swarm has something to do.
+pub(crate) fn targets_cross(problem: &Problem) -> bool {
+    !crossing::is_planar(problem, &Shape::targets(problem).positions(problem))
+}
 
 /// Runs the swarm; the radial layout and the cone, as headings, are among its particles.
 pub(crate) fn layout(
@@ -33,6 +40,8 @@ pub(crate) fn layout(
     (params, seed): (&PsoParams, u64),
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Layout, Error> {
+    // Larger trees have fewer particles.
+    let params = &PsoParams { particles: params.particles_for(problem.n_nodes()), ..params.clone() };
     let dofs = DofMap::new(problem, params.freedom);
     let name = name(params);
     if dofs.dims() == 0 {
@@ -66,11 +75,10 @@ pub(crate) fn layout(
         swarm.record(iteration, params, progress);
     }
     Ok(Layout {
-        name,
-        positions: energy.positions(&swarm.global_best),
         evaluations: swarm.evaluations,
         trace: swarm.trace,
         termination: Termination::BudgetSpent,
+        ..Layout::constructed(&name, energy.positions(&swarm.global_best))
     })
 }
 
@@ -90,13 +98,8 @@ fn targets_met(
         crossings: 0,
     };
     report(&point, params, progress);
-    Layout {
-        name,
-        positions: energy.positions(targets),
-        evaluations: 1,
-        trace: vec![point],
-        termination: Termination::Optimal,
-    }
+    let found = Layout::constructed(&name, energy.positions(targets));
+    Layout { evaluations: 1, trace: vec![point], termination: Termination::Optimal, ..found }
 }
 
 fn name(params: &PsoParams) -> String {

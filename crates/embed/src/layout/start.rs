@@ -170,3 +170,47 @@ pub(crate) fn segments_below(problem: &Problem, segment: usize) -> std::ops::Ran
     let last = problem.tree.subtree(first).end - 1;
     segment..problem.branch[last] as usize + 1
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::{random_tree, views_along};
+    use crate::layout::{cone, radial};
+    use crate::params::Params;
+    use crate::{place, targets};
+
+    /// Section 3.2.2 of [Hu2022]: P_0 = 0, P_1 = the ratios of the radial layout, the rest uniform in the ranges.
+    #[test]
+    fn the_papers_start_is_as_printed() {
+        let tree = random_tree(0, 60, 1.0, false, 9);
+        let (mut params, branches) = (Params::paper(), tree.branches());
+        params.pso.particles = 500;
+        let views = views_along(&tree, glam::DVec3::Z);
+        let targets = targets::targets(&tree, &branches, &views, params.targets).expect("targets");
+        let problem = Problem::new(&tree, branches, targets, &params);
+        let dofs = DofMap::new(&problem, params.pso.freedom);
+        let exact = vec![0.0; problem.n_nodes()];
+        let particle = |heading_rad: &[f64]| {
+            dofs.particle(&problem, &exact, &place::angle_ratios(&problem, heading_rad))
+        };
+        let incumbents = Incumbents {
+            radial: particle(&radial::headings(&problem)),
+            cone: particle(&cone::headings(&problem)),
+        };
+        let energy = CpuEnergy { problem: &problem, dofs: &dofs };
+        let swarm = start(&energy, &incumbents, &params.pso, 3);
+        let dims = dofs.dims();
+        assert_eq!(swarm.ratios[..dims], vec![0.0; dims]);
+        assert_eq!(swarm.ratios[dims..2 * dims], incumbents.radial);
+        assert_eq!((swarm.ratios.len(), swarm.evaluations), (500 * dims, 0));
+        for dim in 0..dims {
+            let (low, high) = dofs.range(dim);
+            let rest = || (2..500).map(|particle| swarm.ratios[particle * dims + dim]);
+            let (least, most) = (rest().fold(f64::INFINITY, f64::min), rest().fold(-1.0, f64::max));
+            assert!(low <= least && least < low + 0.1 && high - 0.1 < most && most <= high, "ratio {dim}");
+            let mean = rest().sum::<f64>() / 498.0;
+            assert!((mean - 0.5 * (low + high)).abs() < 0.12, "ratio {dim}: {mean}");
+        }
+        assert!(swarm.velocities.iter().all(|u| (-1.0..=1.0).contains(u)));
+    }
+}

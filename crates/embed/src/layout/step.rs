@@ -120,6 +120,30 @@ mod tests {
     use crate::params::Params;
     use crate::targets;
 
+    /// Eq. 5 of [Hu2022] by hand: P + .05 (P_g − P) + .05 (P_ig − P) + .0375 (U + γ).
+    #[test]
+    fn the_papers_step_is_equation_5() {
+        let tree = random_tree(0, 40, 1.0, false, 9);
+        let (params, branches) = (Params::paper(), tree.branches());
+        let views = views_along(&tree, glam::DVec3::Z);
+        let targets = targets::targets(&tree, &branches, &views, params.targets).expect("targets");
+        let problem = Problem::new(&tree, branches, targets, &params);
+        let dofs = DofMap::new(&problem, params.pso.freedom);
+        let rule = Rule { problem: &problem, dofs: &dofs, params: &params.pso };
+        let mut numbers = stream(77);
+        let mut ratios = || -> Vec<f64> { (0..dofs.dims()).map(|_| numbers.uniform(-0.5, 0.5)).collect() };
+        let (before, u, own, global) = (ratios(), ratios(), ratios(), ratios());
+        let mut p = before.clone();
+        rule.step(&mut p, &u, (&own, &global), &mut stream(78));
+        let mut gammas = stream(78);
+        for dim in 0..dofs.dims() {
+            let gamma = gammas.uniform(-1.0, 1.0);
+            let pulls = 0.05 * (global[dim] - before[dim]) + 0.05 * (own[dim] - before[dim]);
+            let expected = before[dim] + pulls + 0.0375 * (u[dim] + gamma);
+            assert!((p[dim] - expected).abs() < 1e-15, "ratio {dim}: {} {expected}", p[dim]);
+        }
+    }
+
     /// The largest pulls that params allow, from particles at the ends of their ranges.
     #[test]
     fn ratios_stay_in_their_ranges() {

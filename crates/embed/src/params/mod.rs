@@ -93,13 +93,14 @@ impl Default for Params {
 
 impl Params {
     /// The published values: sections 3.2.2 and 5 of [Hu2022]. The price of a crossing is that of section 3.2.2,
-    /// because the 0.2 of section 5 can leave crossings.
+    /// because the 0.2 of section 5 can leave crossings. No sides are searched, and our solver does not run.
     #[must_use]
     pub fn paper() -> Self {
         Self {
             targets: TargetMode::Projected,
             w_placement: 0.0,
             method: Method::Pso,
+            methods: vec![Method::Projection, Method::Radial, Method::Marino, Method::Pso],
             // The paper takes the sides that its local planes show.
             solver: SolverParams { mirrors: false, ..SolverParams::default() },
             pso: PsoParams::paper(),

@@ -5,6 +5,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::choices::{Freedom, Pull, Start};
 
+/// More nodes than any tree has.
+const ANY_SIZE: u32 = 1_000_000_000;
+/// The least particles to which a large tree brings the swarm.
+const LEAST_PARTICLES: u32 = 16;
+
 /// The paper's particle swarm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -17,6 +22,13 @@ pub struct PsoParams {
     pub particles: u32,
     /// Iterations of the swarm, 0 to 1,000,000. Default 60; the paper has 100. More search deeper.
     pub iterations: u32,
+    /// Up to this many nodes the swarm has its full size, 1 to 1,000,000,000; on larger trees it has fewer particles,
+    /// as many as make particles × nodes the same. Default 300, so that it takes no longer than on a tree of 300
+    /// nodes; the row states how many there were. The paper has one size for all.
+    pub full_size_nodes: u32,
+    /// Above this many nodes the swarm runs only if it is the `method`, 1 to 1,000,000,000. Default 5000; the paper's
+    /// largest tree has fewer.
+    pub max_nodes: u32,
     /// ω_g, the pull to the best of all particles, in [0, 2]. Default 0.9 inside the subtree chosen by `pull`;
     /// the paper has 0.05. Larger gathers the swarm sooner.
     pub omega_g: f64,
@@ -44,6 +56,8 @@ impl Default for PsoParams {
             freedom: Freedom::N,
             particles: 512,
             iterations: 60,
+            full_size_nodes: 300,
+            max_nodes: 5000,
             omega_g: 0.9,
             omega_p: 0.9,
             omega_inertia: 0.0375,
@@ -63,6 +77,8 @@ impl PsoParams {
             freedom: Freedom::S,
             particles: 40_960,
             iterations: 100,
+            full_size_nodes: ANY_SIZE,
+            max_nodes: ANY_SIZE,
             omega_g: 0.05,
             omega_p: 0.05,
             omega_inertia: 0.0375,
@@ -71,6 +87,14 @@ impl PsoParams {
             start: Start::Paper,
             ..Self::default()
         }
+    }
+
+    /// The particles on a tree of so many nodes.
+    #[must_use]
+    pub fn particles_for(&self, n_nodes: usize) -> u32 {
+        let work = u64::from(self.particles) * u64::from(self.full_size_nodes);
+        let most = (work / (n_nodes.max(1) as u64)).max(u64::from(LEAST_PARTICLES));
+        u32::try_from(most).unwrap_or(u32::MAX).min(self.particles)
     }
 
     /// Checks every range.
@@ -93,6 +117,12 @@ impl PsoParams {
         ParamError::check("pso.particles", is_legal, format!("must be from 3 to 1000000, is {particles}"))?;
         let is_legal = iterations <= 1_000_000;
         ParamError::check("pso.iterations", is_legal, format!("must be at most 1000000, is {iterations}"))?;
+        for (key, n_nodes) in
+            [("pso.full_size_nodes", self.full_size_nodes), ("pso.max_nodes", self.max_nodes)]
+        {
+            let is_legal = (1..=ANY_SIZE).contains(&n_nodes);
+            ParamError::check(key, is_legal, format!("must be from 1 to {ANY_SIZE}, is {n_nodes}"))?;
+        }
         ParamError::check("pso.memory_mib", memory_mib >= 1, "must be at least 1, is 0")
     }
 }

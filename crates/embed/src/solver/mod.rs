@@ -38,7 +38,7 @@ mod work;
 
 use espalier_model::{Termination, TracePoint};
 
-use crate::layout::Layout;
+use crate::layout::{Aim, Layout};
 use crate::params::{Params, SolverParams};
 use crate::problem::Problem;
 use crate::separation::Separation;
@@ -156,6 +156,7 @@ impl<'a> Run<'a> {
             evaluations: self.work.done,
             trace: self.trace,
             termination,
+            aim: Aim::Frozen,
         }
     }
 }

@@ -78,14 +78,18 @@ pub(crate) struct Mirrored {
     pub(crate) visits: u64,
 }
 
-/// The problem with chosen sides, if that is asked for, and what was done.
-pub(crate) fn mirrored<'t>(problem: Problem<'t>, params: &Params, seed: u64) -> (Problem<'t>, Report) {
+/// The problem with chosen sides, if that is asked for and changes anything, and what was done.
+pub(crate) fn mirrored<'t>(
+    problem: &Problem<'t>,
+    params: &Params,
+    seed: u64,
+) -> (Option<Problem<'t>>, Report) {
     let mut report = Report::default();
     let wants_solver = params.method == Method::Solver || params.methods.contains(&Method::Solver);
     if !(wants_solver && params.solver.mirrors) {
-        return (problem, report);
+        return (None, report);
     }
-    let found = search(&problem, &params.solver, seed);
+    let found = search(problem, &params.solver, seed);
     report.count_usize("mirror_crossings_before", found.terms_at_start.crossings);
     report.count_usize("mirror_crossings", found.terms.crossings);
     report.count_usize("mirror_near_before", found.terms_at_start.near);
@@ -95,8 +99,9 @@ pub(crate) fn mirrored<'t>(problem: Problem<'t>, params: &Params, seed: u64) -> 
     report.count("mirror_misplacement", found.terms.placement);
     report.count("mirror_evaluations", found.evaluations as f64);
     report.count("mirror_visits", found.visits as f64);
-    let problem = Problem::new(problem.tree, problem.branches, found.targets, params);
-    (problem, report)
+    let is_changed = found.targets.kind != problem.targets.kind;
+    let branches = problem.branches.clone();
+    (is_changed.then(|| Problem::new(problem.tree, branches, found.targets, params)), report)
 }
 
 /// Searches for the sides of all turns.
