@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use espalier_model::Diagnose;
 use espalier_pipeline::{Override, Stage};
-use espalier_tests::{run, run_from, run_range, set, small_swarm};
+use espalier_tests::{results, run, run_from, run_range, set, small_swarm};
 use tempfile::TempDir;
 
 fn pipelines() -> PathBuf {
@@ -31,6 +31,39 @@ fn threads_and_folders_do_not_matter() {
         .into();
     assert_eq!(digests[0], digests[1]);
     assert_eq!(digests[0], digests[2]);
+}
+
+/// The solver with all its parts at work: the sides of turns as they are, so that the targets cross.
+fn with_solver(mirrors: bool) -> Vec<Override> {
+    let mut overrides = small_swarm();
+    overrides.extend([
+        set("embed.solver.mirrors", mirrors),
+        set("embed.solver.effort", 0.05),
+        set("phantom.n_nodes", 400),
+        set("seed", 2),
+    ]);
+    overrides
+}
+
+#[test]
+fn threads_do_not_matter_to_the_solver() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let config = pipelines().join("neuron.toml");
+    for mirrors in [true, false] {
+        let digests: Vec<String> = [1, 2, 3, 16]
+            .map(|threads| {
+                let out = folder.path().join(format!("{mirrors}-{threads}"));
+                run(&config, &out, &with_solver(mirrors), threads).expect("a run").digest
+            })
+            .into();
+        assert!(digests.iter().all(|digest| *digest == digests[0]), "mirrors {mirrors}: {digests:?}");
+    }
+    // There was something to solve.
+    let (_, embedding) = results(&folder.path().join("false-1"));
+    let row = |method: &str| embedding.methods.iter().find(|row| row.method == method).expect(method);
+    let (solver, cone) = (row("solver"), row("cone"));
+    assert!(solver.energy.length + solver.energy.angle > 0.0 && solver.evaluations > 0);
+    assert!(solver.energy.total() < 0.5 * cone.energy.total());
 }
 
 #[test]

@@ -3,14 +3,12 @@
 mod comparison;
 mod file;
 mod losses;
-mod runs;
 
 use glam::DVec2;
 
 pub use comparison::{CompareCell, CompareColumn, ComparedLayout, Comparison, compare_columns};
 pub use file::NODE_COLUMNS;
 pub use losses::{Better, LossColumn, Losses};
-pub use runs::{ComparedRun, ComparedRuns, RUN_COLUMN};
 
 use crate::edits::Edit;
 
