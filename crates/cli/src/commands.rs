@@ -103,6 +103,15 @@ fn run_stage_of_folder(
         // The resolved config has only the name of the input; where it lies stands apart.
         loaded.config.input.path = espalier_pipeline::input_of_run(folder).or(loaded.config.input.path);
     }
+    if let (None, Some(edits)) = (&stage.config, &mut loaded.config.embed.edits)
+        && !edits.is_empty()
+    {
+        // So has it of the edits; a path given here and now starts from here.
+        let is_set_now = arguments.common.overrides.iter().any(|set| set.key == "embed.edits");
+        let named = || Some(std::path::absolute(&*edits).ok()?.to_string_lossy().into_owned());
+        let path = if is_set_now { named() } else { espalier_pipeline::edits_of_run(folder) };
+        *edits = path.unwrap_or_else(|| std::mem::take(edits));
+    }
     let out = stage.out.clone().unwrap_or_else(|| folder.to_owned());
     let mut request = Request { from: Some(which), to: Some(which), ..request(arguments, loaded, out) };
     if request.out != folder {

@@ -280,3 +280,85 @@ fn verify_prints_a_table_and_fails_where_a_claim_does() {
     refused(&folder, &["verify", "out"], 74, &["nodes.tsv"]);
     refused(&folder, &["verify", "nowhere"], 74, &["SHA256SUMS"]);
 }
+
+/// A neuron of a stem and two branches, its run, and edits of it.
+#[test]
+fn manual_edits() {
+    let swc =
+        "1 1 0 0 0 1 -1\n2 3 0 10 0 1 1\n3 3 -3 18 0 1 2\n4 3 -7 26 0 1 3\n5 3 3 18 0 1 2\n6 3 7 26 0 1 5\n";
+    let folder = folder_with("fork.swc", swc.as_bytes());
+    let config = "schema = 1\nname = \"fork\"\n[input]\npath = \"fork.swc\"\n[embed]\nmethods = []\n[render]\nwidth_px = 300\n";
+    fs::write(folder.path().join("fork.toml"), config).expect("config");
+    let run = |arguments: &[&str]| {
+        let output = espalier(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
+        String::from_utf8_lossy(&output.stdout).lines().last().map(str::to_owned)
+    };
+    let plain = run(&["run", "fork.toml", "-o", "out"]);
+    let read = |file: &str| fs::read_to_string(folder.path().join("out").join(file)).expect("file");
+    let plain_embedding: serde_json::Value = serde_json::from_str(&read("embedding.json")).expect("JSON");
+    let digest = plain_embedding["tree"].as_str().expect("a digest");
+    let write = |name: &str, edits: &str| {
+        let text = format!(
+            "{{ \"format\": \"espalier-edits\", \"version\": 1,\n\"tree\": \"{digest}\",\n\"edits\": [\n{edits}\n] }}\n"
+        );
+        fs::write(folder.path().join(name), text).expect("edits");
+    };
+    let edit = |branch: usize, node: usize, angle_deg: f64| {
+        format!("{{ \"branch\": {branch}, \"node\": {node}, \"angle_deg\": {angle_deg} }}")
+    };
+
+    write("edits.json", &edit(2, 1, 40.0));
+    let with_edits = ["--set", "embed.edits=edits.json"];
+    let from_embed = ["run", "fork.toml", "-o", "out", "--from", "embed"];
+    let edited = run(&[from_embed.as_slice(), &with_edits].concat());
+    assert_ne!(edited, plain);
+    let embedding: serde_json::Value = serde_json::from_str(&read("embedding.json")).expect("JSON");
+    let reached = embedding["edits"][0]["angle_reached_deg"].as_f64().expect("a number");
+    assert!((reached - 40.0).abs() < 1e-9, "{reached}");
+    assert!(read("provenance/inputs.tsv").contains("\nedits\t"));
+    assert!(!read("provenance/config.resolved.toml").contains(folder.path().to_str().expect("a path")));
+    run(&["verify", "out"]);
+    // The same again: from the start, as a stage of the run folder, and from a folder elsewhere.
+    assert_eq!(run(&["run", "fork.toml", "-o", "again", "--set", "embed.edits=edits.json"]), edited);
+    assert_eq!(run(&["embed", "out"]), edited);
+    assert_eq!(run(&[["embed", "out"].as_slice(), &with_edits].concat()), run(&["embed", "again"]));
+    assert_eq!(run(&["render", "out"]), edited);
+
+    // A picture of other edits is not made.
+    write("edits.json", &edit(2, 1, 41.0));
+    let render = ["run", "fork.toml", "-o", "out", "--from", "render", "--set", "embed.edits=edits.json"];
+    refused(&folder, &render, 2, &["was not made from", "edits.json", "--from embed"]);
+    // Nor are edits made that cannot be; what is there stays.
+    let before = read("SHA256SUMS");
+    let refuse = |edits: &str, code: i32, fragments: &[&str]| {
+        write("bad.json", edits);
+        let arguments = [from_embed.as_slice(), &["--set", "embed.edits=bad.json"]].concat();
+        refused(&folder, &arguments, code, fragments);
+        assert_eq!(read("SHA256SUMS"), before);
+    };
+    refuse(
+        &edit(3, 1, 40.0),
+        3,
+        &["bad.json", "line 4: edits[0]: there is no branch 3: they are 0 to 2", "hint"],
+    );
+    refuse("{ \"branch\": 1, }", 3, &["bad.json", "line 4"]);
+    // Back onto the stem.
+    let at = |node: usize| {
+        let at = |axis: usize| plain_embedding["positions_mm"][node][axis].as_f64().expect("a coordinate");
+        glam::DVec2::new(at(0), at(1))
+    };
+    let back_deg = (at(4) - at(1)).angle_to(at(0) - at(1)).to_degrees();
+    let turn = format!("{},\n{}", edit(1, 2, 3.0), edit(2, 1, back_deg));
+    refuse(&turn, 8, &["E-EMBED-EDITS", "edits[1]"]);
+    refused(
+        &folder,
+        &[from_embed.as_slice(), &["--set", "embed.edits=nowhere.json"]].concat(),
+        74,
+        &["nowhere.json", "relative to the config"],
+    );
+    // Without them again: the first run's result.
+    assert_eq!(run(&["run", "fork.toml", "-o", "out", "--from", "embed"]), plain);
+    run(&["embed", "again", "--set", "embed.edits="]);
+    assert_eq!(run(&["render", "again"]), plain);
+}

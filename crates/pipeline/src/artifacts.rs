@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use espalier_model::swc::{self, Traced};
 use espalier_model::{
-    Comparison, Diagnose, Embedding, InscribedSpheres, Ledger, Mask, Report, Skeleton, Tree, ViewHierarchy,
-    Volume,
+    Comparison, Diagnose, Edits, Embedding, InscribedSpheres, Ledger, Mask, Report, Skeleton, Tree,
+    ViewHierarchy, Volume,
 };
 
 use crate::config::{Input, Unit};
@@ -30,6 +30,8 @@ const DROPPED_FILE: &str = "stages/01-volume/dropped.tsv";
 pub(crate) struct Artifacts {
     /// Files named by the user, instead of those in the run folder.
     pub(crate) files: BTreeMap<Artifact, PathBuf>,
+    /// The user's manual edits of the embedding.
+    pub(crate) edits_path: Option<PathBuf>,
     pub(crate) read_options: espalier_volume::ReadOptions,
     /// How a traced tree is scaled.
     pub(crate) input: Input,
@@ -158,6 +160,12 @@ impl Artifacts {
         Ok(views)
     }
 
+    /// The manual edits of the embedding of `tree`; none if the config names no file of them.
+    pub(crate) fn edits(&self, tree: &Tree) -> Result<Edits, Error> {
+        let Some(path) = &self.edits_path else { return Ok(Edits::none(tree)) };
+        Edits::from_json(&self.read_text(path)?, tree).map_err(|error| Error::file(path, error))
+    }
+
     pub(crate) fn embedding(&mut self, lookup: Lookup<'_>) -> Result<Arc<Embedding>, Error> {
         let tree = self.tree(lookup)?;
         let embedding = self.embedding.clone();
@@ -206,10 +214,14 @@ impl Artifacts {
             return Ok(known);
         }
         let path = self.locate(artifact, lookup)?;
-        let not_text =
-            |_| Error::Read { path: path.clone(), source: io::Error::from(io::ErrorKind::InvalidData) };
-        let text = String::from_utf8(self.read_bounded(&path)?).map_err(not_text)?;
+        let text = self.read_text(&path)?;
         parse(&text).map(Arc::new).map_err(|error| Error::file(&path, error))
+    }
+
+    fn read_text(&self, path: &Path) -> Result<String, Error> {
+        let not_text =
+            |_| Error::Read { path: path.to_owned(), source: io::Error::from(io::ErrorKind::InvalidData) };
+        String::from_utf8(self.read_bounded(path)?).map_err(not_text)
     }
 
     /// The bytes of a file that is held in memory whole.

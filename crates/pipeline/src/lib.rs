@@ -39,7 +39,7 @@ pub use error::Error;
 pub use espalier_verify::{Check, Outcome};
 pub use event::Event;
 pub use phantom::make_phantom;
-pub use provenance::input_of_run;
+pub use provenance::{edits_of_run, input_of_run};
 pub use run::{Request, Summary, run};
 pub use settings::Difference;
 pub use stage::{Artifact, Stage};

@@ -49,13 +49,26 @@ pub(crate) const TIMING_COLUMNS: [Column; 4] = [
 
 const INPUTS_FILE: &str = "provenance/inputs.tsv";
 const RUN_FILE: &str = "provenance/run.json";
+/// The roles of files in `provenance/inputs.tsv`.
+const INPUT: &str = "input";
+const EDITS: &str = "edits";
 
 /// The absolute path of the input of an earlier run in a folder, where it had one.
 #[must_use]
 pub fn input_of_run(folder: &Path) -> Option<String> {
+    path_of_run(folder, "input")
+}
+
+/// The absolute path of the manual edits of an earlier run in a folder, where it had some.
+#[must_use]
+pub fn edits_of_run(folder: &Path) -> Option<String> {
+    path_of_run(folder, "edits")
+}
+
+fn path_of_run(folder: &Path, key: &str) -> Option<String> {
     let text = std::fs::read_to_string(folder.join(RUN_FILE)).ok()?;
     let record: serde_json::Value = serde_json::from_str(&text).ok()?;
-    record.get("input")?.as_str().map(str::to_owned)
+    record.get(key)?.as_str().map(str::to_owned)
 }
 
 fn absolute(path: &Path) -> Option<String> {
@@ -64,25 +77,56 @@ fn absolute(path: &Path) -> Option<String> {
 
 /// Writes `provenance/inputs.tsv`: the input's content, without its name, which may be a patient's.
 pub(crate) fn write_inputs(folder: &mut RunFolder, input: Option<&Path>) -> Result<(), Error> {
-    folder.write(INPUTS_FILE, inputs_tsv(input)?.as_bytes())
+    let mut table = Table::with(&INPUT_COLUMNS).into_string();
+    table.extend(input.map(|path| row(INPUT, path)).transpose()?);
+    folder.write(INPUTS_FILE, table.as_bytes())
+}
+
+/// Brings the row of the manual edits in `provenance/inputs.tsv` up to date.
+pub(crate) fn write_edits(folder: &mut RunFolder, edits: Option<&Path>) -> Result<(), Error> {
+    let known = rows(folder)?;
+    if known.is_none() && edits.is_none() {
+        return Ok(());
+    }
+    let known = known.unwrap_or_else(|| Table::with(&INPUT_COLUMNS).into_string());
+    let mut table: String = known.split_inclusive('\n').filter(|row| !is_of(EDITS, row)).collect();
+    table.extend(edits.map(|path| row(EDITS, path)).transpose()?);
+    folder.write(INPUTS_FILE, table.as_bytes())
 }
 
 /// Whether the folder's results were made from a file of other content.
 pub(crate) fn is_other_input(folder: &RunFolder, input: &Path) -> Result<bool, Error> {
-    if !folder.path().join(INPUTS_FILE).exists() {
-        return Ok(false);
-    }
-    Ok(folder.read(INPUTS_FILE)? != inputs_tsv(Some(input))?.into_bytes())
+    is_other(folder, INPUT, input)
 }
 
-fn inputs_tsv(input: Option<&Path>) -> Result<String, Error> {
-    let mut table = Table::with(&INPUT_COLUMNS);
-    if let Some(path) = input {
-        let (n_bytes, digest) =
-            file_digest(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
-        table.row(&[&"input", &n_bytes, &digest]);
-    }
-    Ok(table.into_string())
+/// Whether the folder's embedding was made with manual edits of other content.
+pub(crate) fn is_other_edits(folder: &RunFolder, edits: &Path) -> Result<bool, Error> {
+    is_other(folder, EDITS, edits)
+}
+
+fn is_other(folder: &RunFolder, role: &str, path: &Path) -> Result<bool, Error> {
+    let Some(known) = rows(folder)? else { return Ok(false) };
+    let now = row(role, path)?;
+    Ok(!known.split_inclusive('\n').any(|row| row == now))
+}
+
+/// The text of `provenance/inputs.tsv`, if there is one.
+fn rows(folder: &RunFolder) -> Result<Option<String>, Error> {
+    let has_rows = folder.path().join(INPUTS_FILE).exists();
+    has_rows
+        .then(|| folder.read(INPUTS_FILE).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()))
+        .transpose()
+}
+
+fn is_of(role: &str, row: &str) -> bool {
+    row.split('\t').next() == Some(role)
+}
+
+/// The row of a file.
+fn row(role: &str, path: &Path) -> Result<String, Error> {
+    let (n_bytes, digest) =
+        file_digest(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
+    Ok(format!("{role}\t{n_bytes}\t{digest}\n"))
 }
 
 #[derive(Serialize)]
@@ -95,6 +139,9 @@ struct RunRecord<'a> {
     seed: u64,
     /// The absolute path of the input, for stages that read it again.
     input: Option<String>,
+    /// The absolute path of the manual edits, likewise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    edits: Option<String>,
     stages: Vec<&'static str>,
     threads: usize,
     finished_unix_seconds: u64,
@@ -105,7 +152,7 @@ struct RunRecord<'a> {
 pub(crate) fn write_run(
     folder: &RunFolder,
     config: &Config,
-    input: Option<&Path>,
+    (input, edits): (Option<&Path>, Option<&Path>),
     costs: &[StageCost],
     digest: &str,
 ) -> Result<(), Error> {
@@ -117,6 +164,7 @@ pub(crate) fn write_run(
         name: &config.name,
         seed: config.seed,
         input: input.map_or_else(|| input_of_run(folder.path()), absolute),
+        edits: edits.and_then(absolute),
         stages: costs.iter().map(|cost| cost.stage.name()).collect(),
         threads: rayon::current_num_threads(),
         finished_unix_seconds: clock::unix_seconds(),

@@ -76,7 +76,8 @@ fn run_stages(request: &Request, events: &(dyn Fn(Event) + Sync)) -> Result<Summ
     let artifacts = artifacts_of(request, &source);
     let input = input_file(&stages, &artifacts);
     // A missing input must not leave a folder behind.
-    if let Some(path) = &input {
+    let edits = artifacts.edits_path.as_ref().filter(|_| stages.contains(&Stage::Embed));
+    for path in [input.as_ref(), edits].into_iter().flatten() {
         steps::check_readable(path)?;
     }
 
@@ -128,6 +129,10 @@ impl Run<'_> {
                     provenance::write_inputs(folder, input)?;
                 }
             }
+            let edits = self.artifacts.edits_path.as_deref();
+            if stage == Stage::Embed {
+                provenance::write_edits(folder, edits)?;
+            }
             write_outcome(folder, stage, &outcome)?;
             settings.adopt(folder, stage)?;
             let digest = folder.seal()?;
@@ -135,7 +140,7 @@ impl Run<'_> {
             let cost = StageCost { stage, seconds: watch.seconds(), peak_mb, parts };
             let seconds = cost.seconds;
             self.costs.push(cost);
-            provenance::write_run(folder, config, input, &self.costs, &digest)?;
+            provenance::write_run(folder, config, (input, edits), &self.costs, &digest)?;
 
             for warning in outcome.report.warnings {
                 events(Event::Warning { stage, code: warning.code, message: warning.message });
@@ -162,6 +167,12 @@ impl Run<'_> {
         }
         if let Some(difference) = settings.difference(&earlier, available[0]) {
             return Err(Error::OtherSettings { from, difference: Box::new(difference) });
+        }
+        let edits = self.artifacts.edits_path.as_ref().filter(|path| path.is_file());
+        if let Some(path) = edits.filter(|_| earlier.contains(&Stage::Embed))
+            && provenance::is_other_edits(folder, path)?
+        {
+            return Err(Error::OtherInput { from, path: path.clone(), first: Stage::Embed });
         }
         // Scans of many patients share one name; their content tells them apart. A scan that lies elsewhere now, or
         // nowhere, is no reason to stop: nothing will be read from it.
@@ -241,7 +252,9 @@ fn stages_to_do(request: &Request, source: &Source) -> Result<Vec<Stage>, Error>
 }
 
 fn artifacts_of(request: &Request, source: &Source) -> Artifacts {
-    let input = &request.loaded.config.input;
+    let Loaded { config, base_dir } = &request.loaded;
+    let input = &config.input;
+    let edits = config.embed.edits.as_ref().filter(|path| !path.is_empty());
     let mut files = request.files.clone();
     match source {
         Source::Volume(path) => _ = files.entry(Artifact::Volume).or_insert_with(|| path.clone()),
@@ -250,6 +263,7 @@ fn artifacts_of(request: &Request, source: &Source) -> Artifacts {
     }
     Artifacts {
         files,
+        edits_path: edits.map(|path| base_dir.join(path)),
         read_options: espalier_volume::ReadOptions {
             max_bytes: request.max_memory_bytes,
             volume_index: input.volume_index,

@@ -77,10 +77,11 @@ impl Settings {
     }
 }
 
-/// The config without what is of this machine: of the input's path only the file's name.
+/// The config without what is of this machine: of the paths of input and edits only the files' names.
 fn portable(config: &Config) -> Table {
     let mut portable = config.clone();
-    if let Some(path) = &mut portable.input.path {
+    portable.embed.edits = portable.embed.edits.filter(|path| !path.is_empty());
+    for path in [&mut portable.input.path, &mut portable.embed.edits].into_iter().flatten() {
         let name = Path::new(path.as_str()).file_name().unwrap_or_default();
         *path = name.to_string_lossy().into_owned();
     }

@@ -221,10 +221,11 @@ fn embed(step: &mut Step<'_>) -> Result<Outcome, Error> {
     if params.pose == PoseMode::Auto {
         params.pose = if step.artifacts.is_of_scan { PoseMode::View } else { PoseMode::RootOnTop };
     }
-    let watch = MethodWatch::new(step.stage, step.events);
-    let embedded =
-        espalier_embed::embed(&tree, &views, &params, step.config.seed, &|event| watch.hear(event))
-            .map_err(|error| step.failed(error))?;
+    let edits = step.artifacts.edits(&tree)?;
+    let (seed, watch) = (step.config.seed, MethodWatch::new(step.stage, step.events));
+    let hear = |event| watch.hear(event);
+    let embedded = espalier_embed::embed_edited((&tree, &views), &edits, &params, seed, &hear)
+        .map_err(|error| step.failed(error))?;
     step.parts = watch.into_costs();
     let json = embedded.embedding.to_json();
     let embedding = step.read_back(&json, |text| Embedding::from_json(text, &tree))?;
@@ -377,8 +378,13 @@ fn embedding_phrase(embedding: &Embedding) -> String {
         .collect();
     others.sort();
     let others = if others.is_empty() { String::new() } else { format!("  ({})", others.join(", ")) };
+    let n_removed: usize = embedding.edits.iter().map(|record| record.crossings_removed).sum();
+    let edits = match embedding.edits.len() {
+        0 => String::new(),
+        n_edits => format!("  edits {n_edits} ({n_removed} crossings removed)"),
+    };
     format!(
-        "crossings {} ({verdict}{optimal})  length loss {:.1} %  angle loss {:.1}°{others}",
+        "crossings {} ({verdict}{optimal}){edits}  length loss {:.1} %  angle loss {:.1}°{others}",
         certificate.crossings,
         100.0 * embedding.losses.length_loss_mean,
         embedding.losses.angle3d_error_mean_deg,

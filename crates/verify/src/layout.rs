@@ -24,6 +24,10 @@ use crate::{overlaps, ratios, targets};
 const ROUNDING: f64 = 1e-9;
 /// Energies of layouts that differ by less count as equal: rounding of the coordinates can leave as much.
 const EQUAL: f64 = 1e-12;
+/// A turn may be off by so much from what an edit asks for: rounding of the coordinates of short edges.
+const EDIT_DEG: f64 = 1e-3;
+/// What the name of an edited layout adds to that of its method.
+const EDITED: &str = ", edited";
 /// Coordinates outside of this have no exact orientation in doubles; 0 has.
 const EXACT: std::ops::RangeInclusive<f64> = 1e-80..=1e65;
 
@@ -180,6 +184,9 @@ fn check_rows(claim: &Claim<'_>, branches: &Branches) -> Vec<Check> {
         check_best(claim, own),
         check_optimal(embedding),
     ]
+    .into_iter()
+    .chain(check_edits(claim, own))
+    .collect()
 }
 
 fn check_overlaps(own: &MethodRow, found: Overlaps) -> Check {
@@ -213,20 +220,50 @@ fn check_crossing_weight(rows: &[MethodRow], stated: Option<f64>) -> Check {
     Check::unless("price of crossings", price, fault)
 }
 
-/// No certified layout with the same targets has a lower energy.
+/// No certified layout with the same targets has a lower energy; of an edited layout, than the one it was made of.
 fn check_best(claim: &Claim<'_>, own: &MethodRow) -> Check {
-    let energy = own.energy.total();
-    let rivals =
-        claim.embedding.methods.iter().filter(|row| row.crossings == 0 && row.targets == own.targets);
+    let rows = &claim.embedding.methods;
+    let unedited = own.method.strip_suffix(EDITED).filter(|_| !claim.embedding.edits.is_empty());
+    let best = unedited.map_or(Some(own), |name| rows.iter().find(|row| row.method == name));
+    let name = "never worse";
+    let Some(best) = best else {
+        return Check::unless(name, own.method.as_str(), Some("what was edited is no row".to_owned()));
+    };
+    let energy = best.energy.total();
+    let rivals = rows.iter().filter(|row| row.crossings == 0 && row.targets == best.targets);
+    let rivals = rivals.filter(|row| !std::ptr::eq(*row, own));
     let better = rivals.min_by(|a, b| a.energy.total().total_cmp(&b.energy.total()));
     let better = better.filter(|row| row.energy.total() + EQUAL * energy.max(1.0) < energy);
     let fault = better.map(|row| format!("{} has {:.9}", row.method, row.energy.total()));
-    let name = "never worse";
     if claim.must_be_best {
         Check::unless(name, format!("{energy:.9} is the least energy"), fault)
     } else {
         Check::untested(name, own.method.as_str(), "the method was asked for by name")
     }
+}
+
+/// The edits begin with a layout of the table and end with the embedding, and keep what they ask for.
+fn check_edits(claim: &Claim<'_>, own: &MethodRow) -> Option<Check> {
+    let edits = &claim.embedding.edits;
+    let (first, last) = (edits.first()?, edits.last()?);
+    let name = own.method.strip_suffix(EDITED).unwrap_or_default();
+    let base = claim.embedding.methods.iter().find(|row| row.method == name);
+    let differs = |a: f64, b: f64| (a - b).abs() > EQUAL * a.abs().max(1.0);
+    let broken = edits.windows(2).position(|pair| differs(pair[0].energy_after, pair[1].energy_before));
+    let missed = edits.iter().position(|record| {
+        let off_deg = (record.angle_reached_deg - record.edit.angle_deg).abs();
+        off_deg > EDIT_DEG || record.crossings_removed > record.crossings_introduced
+    });
+    let fault = if base.is_none_or(|base| differs(base.energy.total(), first.energy_before)) {
+        Some("the first edit does not begin with the layout that was edited".to_owned())
+    } else if differs(last.energy_after, claim.embedding.energy.total()) {
+        Some("the last edit does not end with the embedding".to_owned())
+    } else if let Some(idx) = broken {
+        Some(format!("edits[{}] does not go on where edits[{idx}] ends", idx + 1))
+    } else {
+        missed.map(|idx| format!("edits[{idx}] is not kept"))
+    };
+    Some(Check::unless("edits", format!("{} made", edits.len()), fault))
 }
 
 /// Nothing that costs is lost, or it is not called optimal.

@@ -46,13 +46,17 @@ pub struct Params {
     pub w_placement: f64,
     /// Weight w_s of the side of a turn, ≥ 0: what it costs that a bend goes to the other side of its target,
     /// beside its angle ratio: per branch, w_s times the mean of 2/π · min(a, π − a, b, π − b) over such bends, a of
-    /// the target, b as drawn. Default 0, the paper's: a mirror image is as true as what it
-    /// mirrors. Larger keeps zigzags zigzags and arcs arcs, at the cost of other losses.
+    /// the target, b as drawn. Default 0, the paper's: a mirror image is as true as what it mirrors. Larger keeps
+    /// arcs arcs and zigzags zigzags, at the cost of other losses.
     pub w_side: f64,
     /// Price of one crossing: `"auto"` or a number > 0. Default `"auto"`, section 3.2.2 of the paper: 1.5 times
     /// the largest possible loss, so that one crossing costs more than any layout without. The 0.2 of section 5
     /// can leave crossings to the swarm; such a result is never used.
     pub w_crossing: CrossingWeight,
+    /// A file of manual edits, `edits.json`, relative to the config's folder: branches that are turned by hand in the
+    /// layout that the run would give without them, and pinned. Default none; `""` says none too.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub edits: Option<String>,
     /// `[[embed.weights]]`: other weights for parts of the tree, by generation, depth, branch or node; of rules
     /// that meet the later one wins. Default none.
     pub weights: Vec<WeightRule>,
@@ -83,6 +87,7 @@ impl Default for Params {
             w_placement: 0.01,
             w_side: 0.0,
             w_crossing: CrossingWeight::Auto,
+            edits: None,
             weights: Vec::new(),
             solver: SolverParams::default(),
             pso: PsoParams::default(),
