@@ -9,7 +9,7 @@ use espalier_views::find_views;
 use glam::DVec3;
 
 use super::conflicts::Conflict;
-use super::moves::{Boldness, Mover};
+use super::moves::Mover;
 use super::setting::Setting;
 use super::state::{Prices, State, Step};
 use super::{Mirrored, search};
@@ -47,11 +47,11 @@ fn sorted(conflicts: &[Conflict]) -> Vec<Conflict> {
 }
 
 /// Takes random steps and compares with a state built from the turns.
-fn check_steps(problem: &Problem, boldness: Boldness, keeps_out: bool, stream: &mut Stream) {
+fn check_steps(problem: &Problem, keeps_out: bool, stream: &mut Stream) {
     let setting = Setting::new(problem, 0.5, keeps_out);
     let (mut state, mut mover, mut step) = (State::new(&setting), Mover::default(), Step::default());
     for round in 0..60 {
-        if !mover.propose(&state, stream, boldness, &mut step) {
+        if !mover.propose(&state, stream, &mut step) {
             continue;
         }
         let before = PRICES.cost(&state.terms());
@@ -91,8 +91,7 @@ fn steps_equal_a_state_built_anew() {
         let (family, n) = (key as usize % FAMILIES.len(), 3 + key as usize % 70);
         let tree = random_tree(family, n, 0.7, false, key);
         let problem = problem(&tree);
-        let boldness = if key % 3 == 0 { Boldness::Planes } else { Boldness::Turns };
-        check_steps(&problem, boldness, key % 2 == 0, &mut stream(6000 + key));
+        check_steps(&problem, key % 2 == 0, &mut stream(6000 + key));
     }
 }
 

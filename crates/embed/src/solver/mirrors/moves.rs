@@ -1,6 +1,6 @@
 //! The moves of the search: which turns change sides together.
 //!
-//! **Input** the state, a stream of random numbers, how bold the phase is. **Output** a `Step`.
+//! **Input** the state, a stream of random numbers. **Output** a `Step`.
 //! **Notation** a segment has the nodes first..=last; its first turn belongs to the fork above it.
 //! **Steps** 1. Where: on the tree path between the edges of a random conflict, or anywhere. 2. What:
 //! - `Fork`: children of a fork change sides, their subtrees are reflected or not (the fork's local plane is
@@ -30,15 +30,6 @@ use crate::siblings;
 /// Of 100 moves, how many are on the path of a conflict: 70 in the measured prototype.
 const ON_PATHS: u32 = 70;
 
-/// How much a move may take apart.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Boldness {
-    /// Local planes as a whole are mirrored.
-    Planes,
-    /// Single turns too.
-    Turns,
-}
-
 /// What a move may be.
 #[derive(Clone, Copy, Debug)]
 enum Kind {
@@ -64,20 +55,10 @@ pub(super) struct Mover {
 
 impl Mover {
     /// A random move into `step`; whether there is one.
-    pub(super) fn propose(
-        &mut self,
-        state: &State,
-        stream: &mut Stream,
-        boldness: Boldness,
-        step: &mut Step,
-    ) -> bool {
+    pub(super) fn propose(&mut self, state: &State, stream: &mut Stream, step: &mut Step) -> bool {
         step.clear();
         let run = self.choose_run(state, stream);
-        let kind = match boldness {
-            Boldness::Planes => plane_move(state, stream, &run),
-            Boldness::Turns => turn_move(state, stream, &run),
-        };
-        kind.is_some_and(|kind| self.make(state, kind, step))
+        turn_move(state, stream, &run).is_some_and(|kind| self.make(state, kind, step))
     }
 
     /// A run of nodes of one segment whose turns have a say in a random conflict; or any segment.
@@ -232,19 +213,6 @@ fn root(state: &State, child: usize, turn_rad: f64, step: &mut Step) {
     let before = |idx: usize| state.turn_rad[children[idx]];
     let after = |idx: usize| if children[idx] == child { turn_rad } else { before(idx) };
     step.siblings_rad = setting.sibling_error_rad(0, after) - setting.sibling_error_rad(0, before);
-}
-
-/// A local plane is mirrored, or a subtree with all its planes.
-fn plane_move(state: &State, stream: &mut Stream, run: &Range<usize>) -> Option<Kind> {
-    let setting = state.setting;
-    let segment = setting.segment_of(run.start);
-    let (first, last) = (segment.start, segment.end - 1);
-    match stream.below(4) {
-        0 if last > first => Some(Kind::Run { first: first + 1, last }),
-        1 => fork_move(state, stream, first, Swing::All),
-        2 => Some(Kind::Below { node: first }),
-        _ => Some(Kind::Below { node: last }),
-    }
 }
 
 /// A run of turns changes sides, or single children of a fork.
