@@ -18,6 +18,7 @@ use crate::choices::Freedom;
 use crate::crossing;
 use crate::problem::Problem;
 use crate::ratio;
+use crate::trig;
 
 /// The energy of one particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -185,9 +186,7 @@ impl CpuEnergy<'_> {
             let turn = problem.side[node] * ratio::embedded_bend(problem.bend[node], ratio);
             heading[node] = heading[problem.parent[node] as usize] + turn;
         }
-        for node in 1..n_nodes {
-            (sin[node], cos[node]) = math::sin_cos(heading[node]);
-        }
+        trig::sin_cos(&heading[1..], &mut sin[1..], &mut cos[1..]);
         for node in 1..n_nodes {
             let parent = problem.parent[node] as usize;
             let stretch = 1.0 + particle[problem.branch[node] as usize];

@@ -126,6 +126,17 @@ impl MarinoView {
     }
 }
 
+/// What a swarm does after the solver.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SwarmUse {
+    /// Nothing.
+    #[default]
+    None,
+    /// It searches around the solver's layout, with every layout of the run among its particles.
+    Polish,
+}
+
 /// Which ratios a particle may choose on its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -5,7 +5,7 @@
 //! | 1 | `targets`, `siblings` | target angles, lengths and headings from the tree and its views |
 //! | 2 | `problem`, `weights`, `ratio` | the frozen problem; the user's weights; equation 3 between angles and ratios |
 //! | 3 | `layout/…` | the methods: `projection`, `radial`, `cone`, `marino`, `pso` (with `start`) |
-//! | 4 | `batch`, `crossing` | the swarm's energy, many particles at once, and its strict crossing count |
+//! | 4 | `batch`, `trig`, `crossing` | the swarm's energy, many particles at once, and its strict crossing count |
 //! | 5 | `pose` | one rigid motion of the whole, mirrored or not; rounding to what is written |
 //! | 6 | `certify`, `overlap` | the exact certificate; overlaps of the drawn tubes |
 //! | 7 | `energy`, `losses/…`, `distances` | the one energy and all losses, for every method alike |
@@ -47,12 +47,15 @@ mod separation;
 mod siblings;
 mod solver;
 mod targets;
+mod trig;
 mod weights;
 
 use espalier_model::{Comparison, Edits, Embedding, Report, Tree, ViewHierarchy};
 
 pub use certify::{certify, crossing_pairs};
-pub use choices::{CrossingWeight, Freedom, KeepOut, MarinoView, Method, PoseMode, Pull, Start, TargetMode};
+pub use choices::{
+    CrossingWeight, Freedom, KeepOut, MarinoView, Method, PoseMode, Pull, Start, SwarmUse, TargetMode,
+};
 pub use error::Error;
 pub use params::{MarinoParams, Params, PsoParams, SolverParams, WeightRule};
 

@@ -106,7 +106,7 @@ mod tests {
         let mut other_row = honest.clone();
         other_row.methods[chosen].energy.angle += 1.0;
         assert!(matches!(check(&other_row, chosen, Method::Solver), Err(Error::Worse { .. })));
-        let mut crossing = honest.clone();
+        let mut crossing = honest;
         crossing.certificate.crossings = 2;
         crossing.certificate.pairs = vec![(3, 5), (4, 9)];
         let expected = Error::Uncertified { crossings: 2, first: 3, second: 5 };

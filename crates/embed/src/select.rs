@@ -16,7 +16,7 @@ use espalier_model::{
 use glam::DVec2;
 use rayon::prelude::*;
 
-use crate::choices::Method;
+use crate::choices::{Method, SwarmUse};
 use crate::distances::SpaceDistances;
 use crate::energy::{self, Scored};
 use crate::error::Error;
@@ -94,7 +94,28 @@ pub(crate) fn run_methods(
     if wants(Method::Solver) {
         layouts.push(announced(events, Method::Solver, || Ok(solver::layout(problem, &cone, params)))?);
     }
+    if wants(Method::Solver) && params.swarm == SwarmUse::Polish {
+        layouts.extend(polished(problem, &layouts, (params, seed), events)?);
+    }
     Ok(layouts)
+}
+
+/// The solver's layout after a swarm; `None` where a swarm has nothing to gain.
+fn polished(
+    problem: &Problem,
+    layouts: &[(Method, Layout)],
+    (params, seed): (&Params, u64),
+    events: &(dyn Fn(Event) + Sync),
+) -> Result<Option<(Method, Layout)>, Error> {
+    // The solver's own comes first: it ran last.
+    let found: Vec<&Layout> =
+        layouts.iter().rev().map(|(_, layout)| layout).filter(|layout| layout.aim == Aim::Frozen).collect();
+    let progress = |progress| events(Event::Searching(progress));
+    events(Event::Started { method: Method::Solver });
+    let layout = pso::polish(problem, &found, (&params.pso, seed), &progress)?;
+    let name = layout.as_ref().map_or("solver", |layout| &layout.name).to_owned();
+    events(Event::Finished { name });
+    Ok(layout.map(|layout| (Method::Solver, layout)))
 }
 
 /// Whether a swarm that is only there to compare is left out.
@@ -367,7 +388,7 @@ mod tests {
         let (views, branches) = (views_along(tree, DVec3::Z), tree.branches());
         let as_seen = targets::targets(tree, &branches, &views, params.targets).expect("targets");
         let mut mirrored = as_seen.clone();
-        for node in [3, 5] {
+        for node in [3, 5].into_iter().filter(|_| is_mirrored) {
             mirrored.angle_rad[node] = TAU - mirrored.angle_rad[node];
         }
         mirrored.kind = TargetKind::IntrinsicMirrored;
@@ -416,6 +437,33 @@ mod tests {
         let embedded = run(&tree, &params, true);
         let chosen = embedded.comparison.chosen;
         assert_eq!(embedded.embedding.methods[chosen].targets, TargetKind::IntrinsicMirrored);
+    }
+
+    #[test]
+    fn a_polished_layout_is_a_row_and_never_worse_than_what_it_began_with() {
+        let mut n_better = 0;
+        for key in 0..12 {
+            let tree = crate::common::random_tree(key as usize % 8, 60, 1.0, false, key);
+            let pso = PsoParams { particles: 64, iterations: 12, ..PsoParams::default() };
+            let solver = crate::params::SolverParams { mirrors: false, ..Default::default() };
+            let params =
+                Params { swarm: SwarmUse::Polish, methods: Vec::new(), pso, solver, ..Params::default() };
+            let embedded = run(&tree, &params, false);
+            let rows = &embedded.embedding.methods;
+            let of = |name: &str| rows.iter().find(|row| row.method == name);
+            let (solver, polished) = (of("solver").expect("a row"), of("solver + swarm 64x12"));
+            // Where the targets do not cross there is nothing to polish.
+            let Some(polished) = polished else {
+                assert_eq!(solver.energy.angle, 0.0, "tree {key}");
+                continue;
+            };
+            // Ratios go through positions and back.
+            assert!(polished.energy.total() <= solver.energy.total() + 1e-9, "tree {key}");
+            assert_eq!(polished.crossings, 0);
+            n_better += usize::from(polished.energy.total() < solver.energy.total() - 1e-6);
+            assert!(embedded.report.warnings.is_empty(), "tree {key}: {:?}", embedded.report.warnings);
+        }
+        assert!(n_better > 3, "{n_better}");
     }
 
     #[test]

@@ -6,7 +6,7 @@
 //! | `radial` | equal angle per tip | none |
 //! | `cone` | nested convex cones that keep sides | none, for any lengths |
 //! | `marino` | radial, bent back towards one view: the baseline of [Marino2015] | none |
-//! | `pso`, with `start`, `step` | the paper's particle swarm, Algorithm 1 | none, or the incumbent wins |
+//! | `pso`, with `start`, `step` | the paper's particle swarm, Algorithm 1; a swarm around the solver's layout | none, or the incumbent wins |
 
 pub(crate) mod cone;
 pub(crate) mod marino;

@@ -18,7 +18,9 @@ use rayon::prelude::*;
 
 use crate::Progress;
 use crate::batch::{BatchEnergy, CpuEnergy, DofMap, Score, Scratch};
+use crate::choices::{Freedom, Pull};
 use crate::crossing;
+use crate::energy;
 use crate::error::Error;
 use crate::layout::Layout;
 use crate::layout::start::{self, Incumbents};
@@ -58,34 +60,73 @@ pub(crate) fn layout(
     // P_g ← P_0: where the targets have no crossing the loop has nothing to do.
     let targets = vec![0.0; dofs.dims()];
     if energy.is_planar(&targets, &mut Scratch::default()) {
-        return Ok(targets_met(&energy, name, &targets, params, progress));
+        return Ok(targets_met(&energy, &name, &targets, params, progress));
     }
-    let mut swarm = Swarm::new(start::start(&energy, &incumbents, params, seed), dofs.dims());
-    let rule = Rule { problem, dofs: &dofs, params };
+    let start = start::start(&energy, &incumbents, params, seed);
+    Ok(search(&energy, start, (params, seed), progress).into_layout(&energy, &name))
+}
 
-    // Algorithm 1: E_p of every particle, P_ig and P_g; then Eq. 5; until no loss is left or c reaches its limit.
-    swarm.evaluate(&energy);
+/// A swarm around layouts that were found: each is a particle, the first the best; freedom `n`, the step of `subtree`.
+/// `None` where there is nothing to gain.
+pub(crate) fn polish(
+    problem: &Problem,
+    found: &[&Layout],
+    (params, seed): (&PsoParams, u64),
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Option<Layout>, Error> {
+    let params = &PsoParams {
+        freedom: Freedom::N,
+        pull: Pull::Subtree,
+        particles: params.particles_for(problem.n_nodes()),
+        ..params.clone()
+    };
+    let dofs = DofMap::new(problem, params.freedom);
+    if dofs.dims() == 0 || !targets_cross(problem) {
+        return Ok(None);
+    }
+    check_memory(params, dofs.dims())?;
+    let energy = CpuEnergy { problem, dofs: &dofs };
+    let incumbents: Vec<Vec<f64>> = found
+        .iter()
+        .take(params.particles as usize / 2)
+        .map(|layout| {
+            let scored = energy::score(problem, &layout.positions, 0.0, 0);
+            let heading_rad = place::headings(problem, &layout.positions);
+            dofs.particle(problem, &scored.length_ratio, &place::angle_ratios(problem, &heading_rad))
+        })
+        .collect();
+    let start = start::around(&energy, &incumbents, params, seed);
+    let name = format!("solver + swarm {}x{}", params.particles, params.iterations);
+    Ok(Some(search(&energy, start, (params, seed), progress).into_layout(&energy, &name)))
+}
+
+/// Algorithm 1: E_p of every particle, P_ig and P_g; then Eq. 5; until no loss is left or c reaches its limit.
+fn search(
+    energy: &CpuEnergy,
+    start: start::Swarm,
+    (params, seed): (&PsoParams, u64),
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Swarm {
+    let dofs = energy.dofs;
+    let mut swarm = Swarm::new(start, dofs.dims());
+    let rule = Rule { problem: energy.problem, dofs, params };
+    swarm.evaluate(energy);
     swarm.record(0, params, progress);
     for iteration in 1..=params.iterations {
-        if swarm.has_no_loss(&dofs) {
+        if swarm.has_no_loss(dofs) {
             break;
         }
         swarm.step(&rule, (seed, iteration));
-        swarm.evaluate(&energy);
+        swarm.evaluate(energy);
         swarm.record(iteration, params, progress);
     }
-    Ok(Layout {
-        evaluations: swarm.evaluations,
-        trace: swarm.trace,
-        termination: Termination::BudgetSpent,
-        ..Layout::constructed(&name, energy.positions(&swarm.global_best))
-    })
+    swarm
 }
 
 /// The layout without any loss.
 fn targets_met(
     energy: &CpuEnergy,
-    name: String,
+    name: &str,
     targets: &[f64],
     params: &PsoParams,
     progress: &(dyn Fn(Progress) + Sync),
@@ -98,7 +139,7 @@ fn targets_met(
         crossings: 0,
     };
     report(&point, params, progress);
-    let found = Layout::constructed(&name, energy.positions(targets));
+    let found = Layout::constructed(name, energy.positions(targets));
     Layout { evaluations: 1, trace: vec![point], termination: Termination::Optimal, ..found }
 }
 
@@ -165,6 +206,15 @@ impl Swarm {
                 self.global_score = score;
                 self.global_best.copy_from_slice(&self.ratios[place]);
             }
+        }
+    }
+
+    fn into_layout(self, energy: &CpuEnergy, name: &str) -> Layout {
+        Layout {
+            evaluations: self.evaluations,
+            trace: self.trace,
+            termination: Termination::BudgetSpent,
+            ..Layout::constructed(name, energy.positions(&self.global_best))
         }
     }
 

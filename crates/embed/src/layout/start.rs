@@ -95,6 +95,22 @@ fn relaxed(energy: &CpuEnergy, incumbents: &Incumbents, params: &PsoParams, seed
     Swarm { velocities: vec![0.0; ratios.len()], ratios, evaluations: evaluations.iter().sum() }
 }
 
+/// A swarm around particles that were found, the first of which is the best: they, and copies of the best with a few
+/// subtrees sent part of the way to another.
+pub(crate) fn around(energy: &CpuEnergy, found: &[Vec<f64>], params: &PsoParams, seed: u64) -> Swarm {
+    let dims = energy.dofs.dims();
+    let mut ratios: Vec<f64> = found.concat();
+    ratios.resize(params.particles as usize * dims, 0.0);
+    let others = &mut ratios[found.len() * dims..];
+    others.par_chunks_mut(dims).enumerate().for_each(|(rank, ratios)| {
+        let mut stream = Stream::new(seed, Purpose::SwarmStart, (found.len() + rank) as u32, 1);
+        ratios.copy_from_slice(&found[0]);
+        let other = stream.below(found.len() as u32) as usize;
+        blend(energy.problem, energy.dofs, &found[other], ratios, &mut stream);
+    });
+    Swarm { velocities: vec![0.0; ratios.len()], ratios, evaluations: 0 }
+}
+
 /// How many particles relax, and how many evaluations each may take.
 fn relaxing_work(problem: &Problem, params: &PsoParams) -> (usize, u64) {
     let total = u64::from(params.particles) * u64::from(params.iterations) / RELAXING_SHARE;
@@ -151,14 +167,14 @@ fn segment_angles(problem: &Problem, dofs: &DofMap, segment: usize) -> std::ops:
     dofs.angle[nodes.start] as usize..dofs.angle[nodes.end - 1] as usize + 1
 }
 
-/// Sends a few random subtrees part of the way to the cone.
-fn blend(problem: &Problem, dofs: &DofMap, cone: &[f64], ratios: &mut [f64], stream: &mut Stream) {
+/// Sends a few random subtrees part of the way to another particle, the cone for example.
+fn blend(problem: &Problem, dofs: &DofMap, other: &[f64], ratios: &mut [f64], stream: &mut Stream) {
     let n_segments = problem.branches.list().len() as u32;
     for _ in 0..1 + stream.below(3) {
         let share = stream.unit();
         for segment in segments_below(problem, stream.below(n_segments) as usize) {
             for dim in segment_angles(problem, dofs, segment) {
-                ratios[dim] += share * (cone[dim] - ratios[dim]);
+                ratios[dim] += share * (other[dim] - ratios[dim]);
             }
         }
     }
