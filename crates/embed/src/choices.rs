@@ -4,7 +4,7 @@
 
 use std::fmt;
 
-use espalier_model::TargetKind;
+use espalier_model::{TargetKind, WidthMode};
 use serde::de::{self, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -39,6 +39,40 @@ pub enum KeepOut {
     On,
     /// Nowhere.
     Off,
+}
+
+/// What is done about tubes that overlap.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum WidthsMode {
+    /// They are counted.
+    #[default]
+    Report,
+    /// Lengths and angles give way until nothing overlaps, as far as they can.
+    Avoid,
+    /// As `Avoid`; then all lengths are scaled against the radii, as little as it takes until nothing overlaps.
+    Stretch,
+}
+
+impl WidthsMode {
+    /// The name used in the config and in files.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Report => "report",
+            Self::Avoid => "avoid",
+            Self::Stretch => "stretch",
+        }
+    }
+}
+
+impl From<WidthsMode> for WidthMode {
+    fn from(mode: WidthsMode) -> Self {
+        match mode {
+            WidthsMode::Report => Self::Report,
+            WidthsMode::Avoid => Self::Avoid,
+            WidthsMode::Stretch => Self::Stretch,
+        }
+    }
 }
 
 /// How the whole is turned in the end.

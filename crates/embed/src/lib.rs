@@ -7,7 +7,7 @@
 //! | 3 | `layout/…` | the methods: `projection`, `radial`, `cone`, `marino`, `pso` (with `start`) |
 //! | 4 | `batch`, `trig`, `crossing` | the swarm's energy, many particles at once, and its strict crossing count |
 //! | 5 | `pose` | one rigid motion of the whole, mirrored or not; rounding to what is written |
-//! | 6 | `certify`, `overlap` | the exact certificate; overlaps of the drawn tubes |
+//! | 6 | `certify`, `widths/…` | the exact certificate; layouts at the widths of their tubes |
 //! | 7 | `energy`, `losses/…`, `distances` | the one energy and all losses, for every method alike |
 //! | 8 | `select`, `never_worse` | the best certified layout, and the table of all; the last look at it |
 //! | 9 | `replay`, `pins` | manual edits in it: branches turned and pinned, the rest laid around them |
@@ -33,7 +33,6 @@ mod error;
 mod layout;
 mod losses;
 mod never_worse;
-mod overlap;
 mod params;
 mod paths;
 mod pins;
@@ -49,15 +48,17 @@ mod solver;
 mod targets;
 mod trig;
 mod weights;
+mod widths;
 
 use espalier_model::{Comparison, Edits, Embedding, Report, Tree, ViewHierarchy};
 
 pub use certify::{certify, crossing_pairs};
 pub use choices::{
     CrossingWeight, Freedom, KeepOut, MarinoView, Method, PoseMode, Pull, Start, SwarmUse, TargetMode,
+    WidthsMode,
 };
 pub use error::Error;
-pub use params::{MarinoParams, Params, PsoParams, SolverParams, WeightRule};
+pub use params::{MarinoParams, Params, PsoParams, SolverParams, WeightRule, WidthsParams};
 
 /// How far the swarm is.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,11 +4,11 @@
 //! an error that is a bug of ours.
 //! **Guarantees** an embedding that leaves the stage is certified; if an optimiser was asked for, its energy is not
 //! above that of any certified layout of the run that was scored against the same targets, unless manual edits were
-//! made in it; and its own row says the
+//! made in it or it gave way to widths; and its own row says the
 //! same of it as the embedding does. Checked in every run, from what is written and not from how it was chosen.
 //! **Cost** one look at each row.
 
-use espalier_model::{Embedding, MethodRow};
+use espalier_model::{Embedding, MethodRow, WidthMode};
 
 use crate::choices::Method;
 use crate::error::Error;
@@ -45,8 +45,9 @@ pub(crate) fn check(embedding: &Embedding, chosen: usize, asked: Method) -> Resu
             && row.targets == embedding.targets.kind
             && !(energy <= least || is_equal(energy, least))
     };
-    // What was pinned by hand may cost more than what was found.
-    let is_free = asked.is_optimiser() && embedding.edits.is_empty();
+    // What was pinned by hand or gave way to widths may cost more than what was found.
+    let is_report = embedding.widths.mode == WidthMode::Report;
+    let is_free = asked.is_optimiser() && embedding.edits.is_empty() && is_report;
     match embedding.methods.iter().find(is_better) {
         Some(row) if is_free => Err(worse(row)),
         _ => Ok(()),

@@ -11,7 +11,7 @@
 
 use espalier_model::{
     Certificate, ComparedLayout, Comparison, EditRecord, Edits, Embedding, Losses, MethodRow, Report,
-    TargetKind, Termination, TracePoint, ViewHierarchy,
+    TargetKind, Termination, TracePoint, ViewHierarchy, WidthMode, Widths,
 };
 use glam::DVec2;
 use rayon::prelude::*;
@@ -25,7 +25,8 @@ use crate::params::Params;
 use crate::pose::{self, Posed};
 use crate::problem::Problem;
 use crate::replay;
-use crate::{Embedded, Event, certify, losses, never_worse, overlap, place, solver};
+use crate::widths::Changed;
+use crate::{Embedded, Event, certify, losses, never_worse, place, solver, widths};
 
 /// The problems of a run.
 #[derive(Clone, Copy)]
@@ -145,7 +146,7 @@ struct Judged {
     certificate: Certificate,
     scored: Scored,
     losses: Losses,
-    overlaps: overlap::Overlaps,
+    widths: Widths,
     evaluations: u64,
     trace: Vec<TracePoint>,
     termination: Termination,
@@ -164,7 +165,7 @@ fn judge(
     let scored = energy::score(problem, &unreflected, posed.quantum_mm, certificate.crossings);
     let mut losses = losses::losses(problem, &unreflected);
     (losses.stress, losses.spearman) = space.compare(&posed.positions);
-    let overlaps = overlap::count(problem, &posed.positions);
+    let widths = widths::measure(problem, &posed.positions);
     let Layout { name, evaluations, trace, termination, positions: drawn, aim } = layout;
     let targets = problem.targets.kind;
     Judged {
@@ -175,7 +176,7 @@ fn judge(
         certificate,
         scored,
         losses,
-        overlaps,
+        widths,
         evaluations,
         trace,
         termination,
@@ -208,7 +209,8 @@ fn edited(
         termination: replayed.termination,
         aim: Aim::Frozen,
     };
-    let edited = judge((problem, space), winner.method, layout, posed);
+    let mut edited = judge((problem, space), winner.method, layout, posed);
+    (edited.widths.mode, edited.widths.length_scale) = (winner.widths.mode, winner.widths.length_scale);
     if !edited.certificate.holds() {
         return Err(replay::conflict(problem, edits.list(), &edited.certificate));
     }
@@ -233,7 +235,8 @@ pub(crate) fn select(
             judge((problem, &space), method, layout, posed)
         })
         .collect();
-    let mut chosen = winner(&judged, params.method)?;
+    let chosen = winner(&judged, params.method)?;
+    let mut chosen = at_widths((problem, &space), &mut judged, chosen, params);
     let mut report = report(problem, &judged, &judged[chosen], params);
     let mut records = Vec::new();
     if !edits.list().is_empty() {
@@ -250,7 +253,8 @@ pub(crate) fn select(
     let comparison =
         Comparison { tree: problem.tree.digest(), targets: problem.targets.digest(), seed, chosen, layouts };
 
-    let Judged { name, posed, certificate, scored, losses, termination, .. } = judged.swap_remove(chosen);
+    let Judged { name, posed, certificate, scored, losses, widths, termination, .. } =
+        judged.swap_remove(chosen);
     let termination = if is_optimal(&scored) { Termination::Optimal } else { termination };
     let embedding = Embedding {
         tree: problem.tree.digest(),
@@ -264,6 +268,7 @@ pub(crate) fn select(
         energy: scored.energy,
         losses,
         certificate,
+        widths,
         pose: posed.pose,
         termination,
         trace,
@@ -285,6 +290,37 @@ fn edits_report((edited, records): &(Judged, Vec<EditRecord>)) -> Report {
 /// Whether no length and no angle is lost: nothing can be better for these targets.
 fn is_optimal(scored: &Scored) -> bool {
     scored.energy.length + scored.energy.angle == 0.0
+}
+
+/// Adds what the params ask for where the tubes of the layout to use overlap; the index of the layout to use then.
+fn at_widths(
+    (problem, space): (&Problem, &SpaceDistances),
+    judged: &mut Vec<Judged>,
+    chosen: usize,
+    params: &Params,
+) -> usize {
+    let mode = params.widths.mode;
+    judged.iter_mut().for_each(|judged| judged.widths.mode = mode.into());
+    let winner = &judged[chosen];
+    let Some(Changed { positions, length_scale }) = widths::change(problem, &winner.drawn, params) else {
+        return chosen;
+    };
+    let posed = pose::pose(problem, &positions, params.pose);
+    let layout = Layout {
+        name: format!("{}-{}", winner.name, mode.name()),
+        positions,
+        evaluations: 0,
+        trace: Vec::new(),
+        termination: winner.termination,
+        aim: Aim::Frozen,
+    };
+    let mut changed = judge((problem, space), winner.method, layout, posed);
+    if !changed.certificate.holds() || changed.widths.overlaps >= winner.widths.overlaps {
+        return chosen;
+    }
+    (changed.widths.mode, changed.widths.length_scale) = (mode.into(), length_scale);
+    judged.push(changed);
+    judged.len() - 1
 }
 
 /// The index of the layout to use.
@@ -311,7 +347,7 @@ fn compared(judged: &Judged) -> ComparedLayout {
     let row = MethodRow {
         method: judged.name.clone(),
         crossings: judged.certificate.crossings,
-        overlaps: judged.overlaps.count,
+        overlaps: judged.widths.overlaps,
         energy: judged.scored.energy,
         losses: judged.losses,
         evaluations: judged.evaluations,
@@ -326,7 +362,11 @@ fn report(problem: &Problem, judged: &[Judged], winner: &Judged, params: &Params
     report.count_usize("nodes", problem.n_nodes());
     report.count_usize("branches", problem.branches.list().len());
     report.count_usize("crossings", winner.certificate.crossings);
-    report.count_usize("overlaps", winner.overlaps.count);
+    report.count_usize("overlaps", winner.widths.overlaps);
+    report.count("radius_scale_without_overlaps", winner.widths.radius_scale);
+    report.count("length_scale", winner.widths.length_scale);
+    report.count("area_needed_mm2", winner.widths.area_needed_mm2);
+    report.count("area_available_mm2", winner.widths.area_available_mm2);
     report.count("energy", winner.scored.energy.total());
     report.count("length_loss_mean", winner.losses.length_loss_mean);
     report.count("angle3d_error_mean_deg", winner.losses.angle3d_error_mean_deg);
@@ -335,7 +375,7 @@ fn report(problem: &Problem, judged: &[Judged], winner: &Judged, params: &Params
     if params.methods.contains(&Method::Pso) && is_too_large_for_swarm(problem, params) {
         report.count("pso_left_out_above_nodes", params.pso.max_nodes);
     }
-    if !winner.overlaps.is_complete {
+    if !winner.widths.is_complete {
         let message = format!(
             "the mean radius is {} mm, the median edge {} mm: too many tubes overlap to count them all; check the \
              unit of the radii",
@@ -343,6 +383,19 @@ fn report(problem: &Problem, judged: &[Judged], winner: &Judged, params: &Params
             problem.scale_mm
         );
         report.warn("W-EMBED-THICK-TUBES", message);
+    }
+    if winner.widths.are_impossible() {
+        let Widths { area_needed_mm2, area_available_mm2, .. } = winner.widths;
+        let message = format!(
+            "the tubes need at least {area_needed_mm2:.0} mm², but with exact lengths there are only \
+             {area_available_mm2:.0} mm²: no layout keeps both lengths and widths without overlaps"
+        );
+        report.warn("W-EMBED-NO-ROOM", message);
+    }
+    if winner.widths.mode != WidthMode::Report && winner.widths.overlaps > 0 {
+        let Widths { overlaps, radius_scale, .. } = winner.widths;
+        let message = format!("{overlaps} overlaps are left; none at {radius_scale:.3} of the radii");
+        report.warn("W-EMBED-OVERLAPS", message);
     }
     if winner.method != asked {
         let reason = match judged.iter().find(|judged| judged.method == asked) {

@@ -3,12 +3,14 @@
 mod comparison;
 mod file;
 mod losses;
+mod widths;
 
 use glam::DVec2;
 
 pub use comparison::{CompareCell, CompareColumn, ComparedLayout, Comparison, compare_columns};
 pub use file::NODE_COLUMNS;
 pub use losses::{Better, LossColumn, Losses};
+pub use widths::{WidthMode, Widths};
 
 use crate::edits::Edit;
 
@@ -210,6 +212,8 @@ pub struct Embedding {
     pub losses: Losses,
     /// The certificate.
     pub certificate: Certificate,
+    /// What is known of it at the widths of the tubes.
+    pub widths: Widths,
     /// The last rigid motion.
     pub pose: Pose,
     /// Why it ended.

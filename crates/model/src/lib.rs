@@ -42,7 +42,7 @@ pub use edits::{Edit, EditError, Edits};
 pub use embedding::{
     Better, Certificate, CompareCell, CompareColumn, ComparedLayout, Comparison, EditRecord, Embedding,
     Energy, LossColumn, Losses, MethodRow, NODE_COLUMNS, Pose, TargetKind, Targets, Termination, TracePoint,
-    compare_columns,
+    WidthMode, Widths, compare_columns,
 };
 pub use grid::{Grid, GridError};
 pub use ledger::{LEDGER_COLUMNS, Ledger, LedgerEntry, LedgerKind};

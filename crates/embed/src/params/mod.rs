@@ -4,6 +4,7 @@ mod marino;
 mod pso;
 mod solver;
 mod weights;
+mod widths;
 
 use std::borrow::Cow;
 
@@ -14,6 +15,7 @@ pub use marino::MarinoParams;
 pub use pso::PsoParams;
 pub use solver::SolverParams;
 pub use weights::WeightRule;
+pub use widths::WidthsParams;
 
 use crate::choices::{CrossingWeight, Method, PoseMode, SwarmUse, TargetMode};
 
@@ -71,6 +73,8 @@ pub struct Params {
     pub pso: PsoParams,
     /// `[embed.marino]`: the baseline of one view.
     pub marino: MarinoParams,
+    /// `[embed.widths]`: what is done about tubes that overlap.
+    pub widths: WidthsParams,
 }
 
 impl Default for Params {
@@ -98,6 +102,7 @@ impl Default for Params {
             solver: SolverParams::default(),
             pso: PsoParams::default(),
             marino: MarinoParams::default(),
+            widths: WidthsParams::default(),
         }
     }
 }

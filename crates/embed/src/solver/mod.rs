@@ -20,7 +20,7 @@
 //! **Source** ours; the energy is Eq. 4 of [Hu2022].
 //! **Cost** `WORK_PER_EDGE` units for an edge and start at most, times the effort.
 
-mod barrier;
+pub(crate) mod barrier;
 #[cfg(test)]
 mod checks;
 mod descent;

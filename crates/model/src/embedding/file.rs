@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::losses::LossesFile;
 use super::{
-    Certificate, EditRecord, Embedding, Energy, MethodRow, Pose, TargetKind, Targets, Termination, TracePoint,
+    Certificate, EditRecord, Embedding, Energy, MethodRow, Pose, TargetKind, Targets, Termination,
+    TracePoint, WidthMode, Widths,
 };
 use crate::edits::Edit;
 use crate::table::{Column, Table, fixed};
@@ -16,7 +17,7 @@ use crate::tree::Tree;
 use crate::versioned::{self, FileError};
 
 const FORMAT: &str = "espalier-embedding";
-/// 2: more losses.
+/// 2: more losses, manual edits, widths.
 const VERSION: u32 = 2;
 
 /// The columns of `nodes.tsv`.
@@ -136,6 +137,7 @@ struct EmbeddingFile {
     quantum_mm: f64,
     pose: PoseFile,
     certificate: CertificateFile,
+    widths: WidthsFile,
     energy: EnergyFile,
     losses: LossesFile,
     methods: Vec<MethodRowFile>,
@@ -190,6 +192,26 @@ struct EnergyFile {
 struct CertificateFile {
     crossings: usize,
     pairs: Vec<(usize, usize)>,
+}
+
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum WidthModeFile {
+    Report,
+    Avoid,
+    Stretch,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WidthsFile {
+    mode: WidthModeFile,
+    overlaps: usize,
+    is_complete: bool,
+    radius_scale: f64,
+    length_scale: f64,
+    area_needed_mm2: f64,
+    area_available_mm2: f64,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -307,6 +329,7 @@ impl From<&Embedding> for EmbeddingFile {
                 crossings: embedding.certificate.crossings,
                 pairs: embedding.certificate.pairs.clone(),
             },
+            widths: embedding.widths.into(),
             energy: embedding.energy.into(),
             losses: embedding.losses.into(),
             methods: embedding.methods.iter().map(Into::into).collect(),
@@ -333,11 +356,40 @@ impl From<EmbeddingFile> for Embedding {
             energy: file.energy.into(),
             losses: file.losses.into(),
             certificate: Certificate { crossings: file.certificate.crossings, pairs: file.certificate.pairs },
+            widths: file.widths.into(),
             pose: Pose { rotation_rad: file.pose.rotation_rad, is_reflected: file.pose.is_reflected },
             termination: file.termination.into(),
             trace: file.trace.into_iter().map(Into::into).collect(),
             methods: file.methods.into_iter().map(Into::into).collect(),
             edits: file.edits.into_iter().map(Into::into).collect(),
+        }
+    }
+}
+
+impl From<Widths> for WidthsFile {
+    fn from(widths: Widths) -> Self {
+        Self {
+            mode: widths.mode.into(),
+            overlaps: widths.overlaps,
+            is_complete: widths.is_complete,
+            radius_scale: widths.radius_scale,
+            length_scale: widths.length_scale,
+            area_needed_mm2: widths.area_needed_mm2,
+            area_available_mm2: widths.area_available_mm2,
+        }
+    }
+}
+
+impl From<WidthsFile> for Widths {
+    fn from(file: WidthsFile) -> Self {
+        Self {
+            mode: file.mode.into(),
+            overlaps: file.overlaps,
+            is_complete: file.is_complete,
+            radius_scale: file.radius_scale,
+            length_scale: file.length_scale,
+            area_needed_mm2: file.area_needed_mm2,
+            area_available_mm2: file.area_available_mm2,
         }
     }
 }
@@ -466,6 +518,7 @@ macro_rules! same_variants {
 same_fields!(Energy, EnergyFile { length, angle, side, placement, crossing });
 same_fields!(TracePoint, TracePointFile { iteration, evaluations, energy, crossings });
 same_variants!(TargetKind, TargetKindFile { Intrinsic, Projected, IntrinsicMirrored, ProjectedMirrored });
+same_variants!(WidthMode, WidthModeFile { Report, Avoid, Stretch });
 same_variants!(Termination, TerminationFile { Constructed, Optimal, Converged, BudgetSpent });
 
 #[cfg(test)]
@@ -507,6 +560,15 @@ mod tests {
             energy: row.energy,
             losses: row.losses,
             certificate: Certificate::default(),
+            widths: Widths {
+                mode: WidthMode::Stretch,
+                overlaps: 2,
+                is_complete: true,
+                radius_scale: 1.0 / 3.0,
+                length_scale: 1.5,
+                area_needed_mm2: 0.1,
+                area_available_mm2: 0.3,
+            },
             pose: Pose { rotation_rad: 0.3, is_reflected: false },
             termination: Termination::BudgetSpent,
             trace: vec![TracePoint { iteration: 0, evaluations: 1, energy: 0.3, crossings: 0 }],
@@ -533,6 +595,7 @@ mod tests {
         assert_eq!(back.to_json(), embedding.to_json());
         assert_eq!(back.methods, embedding.methods);
         assert_eq!(back.edits, embedding.edits);
+        assert_eq!(back.widths, embedding.widths);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use espalier_geom::math;
 use espalier_geom::random::{Purpose, Stream};
 use espalier_model::{
     Certificate, Embedding, Energy, LocalPlane, Losses, Node, Pose, SubtreeView, TargetKind, Targets,
-    Termination, Tree, View, ViewHierarchy,
+    Termination, Tree, View, ViewHierarchy, Widths,
 };
 use glam::{DVec2, DVec3};
 
@@ -45,6 +45,7 @@ pub(crate) fn flat(tree: &Tree) -> Embedding {
         energy: Energy::default(),
         losses: Losses { angle3d_error_mean_deg: 0.4, angle3d_error_max_deg: 3.2, ..Losses::default() },
         certificate: Certificate::default(),
+        widths: Widths::default(),
         pose: Pose::default(),
         termination: Termination::Constructed,
         trace: Vec::new(),

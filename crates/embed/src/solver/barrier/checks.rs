@@ -116,7 +116,7 @@ fn every_near_pair_is_listed() {
             (0..tree.n_nodes()).map(|_| DVec2::new(stream.normal(), stream.normal()) * 8.0).collect();
         let mut spacing = plain(&separation, 3.0 * problem.scale_mm);
         let mut list = PairList::new(&problem);
-        list.rebuild(&problem, &mut spacing, (&places, &places), &mut Work::up_to(u64::MAX));
+        list.rebuild(&problem, &mut spacing, &places, &mut Work::up_to(u64::MAX));
         // Moved a little, the list still holds.
         let moved = 0.7 * list.skin_mm();
         places
@@ -129,7 +129,7 @@ fn every_near_pair_is_listed() {
         assert!(listed.windows(2).all(|pair| pair[0] != pair[1]), "tree {key}: twice");
         for b in 1..tree.n_nodes() {
             for a in 1..b {
-                let Some(bounds) = spacing.bounds(&places, a, b) else { continue };
+                let Some(bounds) = spacing.bounds(a, b) else { continue };
                 let (s, t) = (
                     crate::separation::segment(&problem, &places, a),
                     crate::separation::segment(&problem, &places, b),

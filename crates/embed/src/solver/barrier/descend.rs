@@ -4,8 +4,9 @@
 //! **Steps** 1. Ratios at a bound that push outwards, and pinned ones, are held. 2. Direction by the last ten
 //! steps and the diagonal of the curvature. 3. Try the step, cut at the bounds. Where edges meet, only the ratios
 //! on the tree paths between them move less. 4. If the total falls
-//! too little, all move less. 5. Of all that was accepted, the one with the least energy is kept.
-//! **Guarantees** the kept ratios have no edges that meet; their energy is at most that of the start.
+//! too little, all move less. 5. Of all that was accepted, the one with the least energy is kept, or
+//! the last one.
+//! **Guarantees** the kept ratios have no edges that meet. Under `LeastEnergy` their energy is at most that of the start.
 //! **Cost** iterations · (evaluations per step, mostly 1–2) · O(N + pairs).
 
 use super::super::work::Work;
@@ -45,6 +46,15 @@ pub(crate) struct Outcome {
     pub(crate) pairs: usize,
 }
 
+/// What a descent returns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Keep {
+    /// Of all steps that with the least energy, the barrier left out.
+    LeastEnergy,
+    /// The last step: the least energy with the barrier.
+    Last,
+}
+
 /// How ratios are held.
 pub(super) struct Limits {
     /// Least and largest value of each ratio.
@@ -58,7 +68,10 @@ impl Limits {
     pub(super) fn new<S: Spacing>(field: &Field<S>) -> Self {
         let (n_lengths, n_nodes) = (field.n_lengths(), field.problem.n_nodes());
         let mut range = vec![ratio::LENGTH_RANGE; n_lengths];
-        range.resize(n_lengths + n_nodes, ratio::ANGLE_RANGE);
+        // Children of the root have no edge onto which they could be folded.
+        let (low, high) = ratio::ANGLE_RANGE;
+        let parent = &field.problem.parent;
+        range.extend((0..n_nodes).map(|node| (if parent[node] == 0 { -1.0 } else { low }, high)));
         let is_free = field.problem.free_length.iter().chain(&field.problem.free_angle).copied().collect();
         Self { range, is_free }
     }
@@ -78,7 +91,7 @@ struct State {
 pub(super) fn descend<S: Spacing>(
     field: &mut Field<S>,
     x: &mut [f64],
-    (limits, iterations): (&Limits, usize),
+    (limits, iterations, keep): (&Limits, usize, Keep),
     work: &mut Work,
 ) -> Outcome {
     let mut value = field.value(x, work);
@@ -122,14 +135,13 @@ pub(super) fn descend<S: Spacing>(
                 continue;
             }
         }
-        field.accept();
         std::mem::swap(&mut last_gradient, &mut state.gradient);
         field.gradient(&trial, &mut state.gradient);
         state.memory.keep((&state.x, &trial), (&last_gradient, &state.gradient));
         state.x.copy_from_slice(&trial);
         state.value = value;
         outcome.iterations += 1;
-        if value.loss < outcome.loss_after {
+        if keep == Keep::Last || value.loss < outcome.loss_after {
             outcome.loss_after = value.loss;
             x.copy_from_slice(&state.x);
         }

@@ -94,8 +94,6 @@ pub(super) struct Field<'a, S> {
     /// Pairs that met in the last evaluation.
     pub(super) met: Vec<(u32, u32)>,
     pub(super) positions: Vec<DVec2>,
-    /// Positions of the last accepted ratios.
-    accepted: Vec<DVec2>,
     turn: Vec<f64>,
     heading: Vec<f64>,
     unit: Vec<DVec2>,
@@ -120,7 +118,6 @@ impl<'a, S: Spacing> Field<'a, S> {
             pushes: Vec::new(),
             met: Vec::new(),
             positions: vec![DVec2::ZERO; n_nodes],
-            accepted: vec![DVec2::ZERO; n_nodes],
             turn: vec![0.0; n_nodes],
             heading: vec![0.0; n_nodes],
             unit: vec![DVec2::ZERO; n_nodes],
@@ -143,21 +140,12 @@ impl<'a, S: Spacing> Field<'a, S> {
         self.pairs.pairs.len()
     }
 
-    /// Makes the places of the last evaluation those at which rules look.
-    pub(super) fn accept(&mut self) {
-        self.accepted.copy_from_slice(&self.positions);
-    }
-
     /// E + μ Σ b at x.
     pub(super) fn value(&mut self, x: &[f64], work: &mut Work) -> Value {
         self.n_evaluations += 1;
         self.place(x);
-        if self.n_evaluations == 1 {
-            self.accept();
-        }
         if self.pairs.is_stale(&self.positions) {
-            let places = (&self.positions[..], &self.accepted[..]);
-            self.pairs.rebuild(self.problem, &mut self.spacing, places, work);
+            self.pairs.rebuild(self.problem, &mut self.spacing, &self.positions, work);
         }
         work.spend(self.problem.n_nodes() + self.pairs.pairs.len());
         self.met.clear();

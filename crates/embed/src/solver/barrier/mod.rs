@@ -32,9 +32,10 @@ use crate::problem::Problem;
 use crate::separation::Separation;
 use descend::{Limits, descend};
 use field::Field;
-use pairs::{Bounds, Pair, PairList, Spacing};
+use pairs::{Pair, PairList};
 
-pub(crate) use descend::Outcome;
+pub(crate) use descend::{Keep, Outcome};
+pub(crate) use pairs::{Bounds, Spacing};
 
 /// One run of the descent.
 #[derive(Clone, Copy, Debug)]
@@ -84,10 +85,21 @@ pub(crate) fn minimise(
 ) -> Outcome {
     let near = too_near(problem, separation, &shape.positions(problem), work);
     let spacing = Clearance { separation, reach_mm: settings.reach_mm, near };
+    minimise_under(problem, separation, shape, (spacing, settings, Keep::LeastEnergy), work)
+}
+
+/// The same under any rule of what pairs of edges have to keep.
+pub(crate) fn minimise_under<S: Spacing>(
+    problem: &Problem,
+    separation: &Separation,
+    shape: &mut Shape,
+    (spacing, settings, keep): (S, &Settings, Keep),
+    work: &mut Work,
+) -> Outcome {
     let mut x: Vec<f64> = shape.length_ratio.iter().chain(&shape.angle_ratio).copied().collect();
     let mut field = Field::new(problem, &separation.paths, spacing, settings.strength);
     let limits = Limits::new(&field);
-    let outcome = descend(&mut field, &mut x, (&limits, settings.iterations), work);
+    let outcome = descend(&mut field, &mut x, (&limits, settings.iterations, keep), work);
     let n_lengths = shape.length_ratio.len();
     shape.length_ratio.copy_from_slice(&x[..n_lengths]);
     shape.angle_ratio.copy_from_slice(&x[n_lengths..]);
@@ -103,7 +115,7 @@ fn too_near(
 ) -> Vec<(u32, u32)> {
     let mut spacing = Clearance { separation, reach_mm: 0.0, near: Vec::new() };
     let mut list = PairList::new(problem);
-    list.rebuild(problem, &mut spacing, (positions, positions), work);
+    list.rebuild(problem, &mut spacing, positions, work);
     let is_near =
         |pair: &&Pair| separation.too_near(problem, positions, pair.first as usize, pair.second as usize);
     let mut near: Vec<_> = list.pairs.iter().filter(is_near).map(|pair| (pair.first, pair.second)).collect();
@@ -136,7 +148,7 @@ impl Spacing for Clearance<'_> {
         self.reach_mm >= WIDEST_FLOOR * self.separation.clearance_mm && self.reach_mm > 0.0
     }
 
-    fn bounds(&self, _positions: &[DVec2], a: usize, b: usize) -> Option<Bounds> {
+    fn bounds(&self, a: usize, b: usize) -> Option<Bounds> {
         let gap_mm = self.separation.paths.gap_mm(a, b);
         if gap_mm <= 0.0 {
             return None;

@@ -44,8 +44,8 @@ pub(crate) trait Spacing: Sync {
     fn reach_mm(&self) -> f64;
     /// Halves the reach; false if it is as short as the rule allows.
     fn halve_reach(&mut self) -> bool;
-    /// What edges a < b that have no common node have to keep, if anything; positions are the last accepted ones.
-    fn bounds(&self, positions: &[DVec2], a: usize, b: usize) -> Option<Bounds>;
+    /// What edges a < b have to keep, if anything; nothing if they have a common node.
+    fn bounds(&self, a: usize, b: usize) -> Option<Bounds>;
 }
 
 /// A pair of edges, the first above the second in preorder, with what it has to keep.
@@ -99,12 +99,12 @@ impl PairList {
             || self.anchors.iter().zip(positions).any(|(a, p)| a.distance_squared(*p) > most)
     }
 
-    /// Makes the list for the places of now; `accepted` is where the rule looks.
+    /// Makes the list for the places of now.
     pub(super) fn rebuild(
         &mut self,
         problem: &Problem,
         spacing: &mut impl Spacing,
-        (positions, accepted): (&[DVec2], &[DVec2]),
+        positions: &[DVec2],
         work: &mut Work,
     ) {
         self.anchors.clear();
@@ -113,8 +113,7 @@ impl PairList {
         loop {
             self.skin_mm = SKIN_SHARE * spacing.reach_mm();
             let slack_mm = 2.0 * self.skin_mm;
-            let mut search =
-                Search { problem, spacing: &*spacing, positions, accepted, cells_per_mm: 0.0, slack_mm };
+            let mut search = Search { problem, spacing: &*spacing, positions, cells_per_mm: 0.0, slack_mm };
             search.cells_per_mm = search.cells_per_mm();
             self.enter(&search);
             if self.collect(&search, most_pairs, work) {
@@ -239,7 +238,6 @@ struct Search<'a, S> {
     problem: &'a Problem<'a>,
     spacing: &'a S,
     positions: &'a [DVec2],
-    accepted: &'a [DVec2],
     cells_per_mm: f64,
     /// By how much a pair can come nearer while the list holds.
     slack_mm: f64,
@@ -280,7 +278,7 @@ impl<S: Spacing> Search<'_, S> {
         if are_apart(p, q, thick_mm + self.spacing.reach_mm() + self.slack_mm) {
             return None;
         }
-        let bounds = self.spacing.bounds(self.accepted, first, second)?;
+        let bounds = self.spacing.bounds(first, second)?;
         let reach_mm = bounds.floor_mm + bounds.width_mm + self.slack_mm;
         let is_near = Contact::between(p, q).distance < reach_mm;
         is_near.then_some(Pair { first: first as u32, second: second as u32, bounds })

@@ -1,6 +1,6 @@
 //! Overlaps: where the drawn tubes, not only their centrelines, run into each other.
 //!
-//! **Input** positions and radii. **Output** the number of pairs of edges that overlap.
+//! **Input** positions and radii. **Output** the pairs of edges that overlap.
 //! **Definition** an edge is drawn as a capsule of its mean radius. Two edges overlap if they have no node in
 //! common, their capsules do (distance < r_e + r_f), and this is not the plain thickness of the organ about the
 //! place where they part: the path along the tree between their near ends is longer than r_e + r_f, and longer
@@ -13,6 +13,8 @@
 //! **Guarantees** exact up to 20 million pairs whose boxes meet, a lower bound beyond.
 //! **Cost** O(N log N + boxes that meet).
 
+use std::f64::consts::FRAC_PI_2;
+
 use espalier_geom::math;
 use espalier_geom::plane::{Segment, segment_distance};
 use glam::DVec2;
@@ -23,81 +25,115 @@ use crate::problem::Problem;
 /// The most pairs that are looked at: a tree whose radii are in another unit than its positions has billions.
 const MOST_PAIRS: u64 = 20_000_000;
 
-/// What was found.
-pub(crate) struct Overlaps {
-    /// The number of overlapping pairs of edges.
-    pub(crate) count: usize,
-    /// Whether all pairs were looked at; if not, the count is a lower bound.
-    pub(crate) is_complete: bool,
+/// Two edges whose capsules meet.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Meeting {
+    /// Their distance, in mm.
+    pub(super) distance_mm: f64,
+    /// The sum of their radii.
+    pub(super) reach_mm: f64,
+    /// The path along the tree between their near ends.
+    pub(super) between_mm: f64,
+    /// The junction disc where they part, as the gap makes it.
+    pub(super) disc_mm: f64,
+    /// The shorter of the two branches there.
+    pub(super) branch_mm: f64,
 }
 
-/// Counts the overlapping pairs of edges.
-pub(crate) fn count(problem: &Problem, positions: &[DVec2]) -> Overlaps {
+impl Meeting {
+    /// Whether they overlap as defined above.
+    pub(super) fn is_overlap(&self) -> bool {
+        self.between_mm > self.reach_mm && self.between_mm > 2.0 * self.disc_mm.min(self.branch_mm)
+    }
+}
+
+/// Visits the pairs of edges without a common node whose capsules meet; false if there were too many to look at all.
+pub(super) fn each_meeting(problem: &Problem, positions: &[DVec2], mut visit: impl FnMut(&Meeting)) -> bool {
     let tubes = Tubes::new(problem, positions);
+    let low: Vec<DVec2> = (0..positions.len()).map(|node| tubes.bounds(node).0).collect();
     let mut order: Vec<usize> = (1..positions.len()).collect();
-    order.sort_by(|&a, &b| tubes.low[a].x.total_cmp(&tubes.low[b].x).then(a.cmp(&b)));
-    let (mut count, mut n_pairs) = (0, 0_u64);
+    order.sort_by(|&a, &b| low[a].x.total_cmp(&low[b].x).then(a.cmp(&b)));
+    let mut n_pairs = 0_u64;
     for (place, &a) in order.iter().enumerate() {
-        for &b in order[place + 1..].iter().take_while(|&&b| tubes.low[b].x <= tubes.high[a].x) {
-            if tubes.low[b].y > tubes.high[a].y || tubes.low[a].y > tubes.high[b].y {
+        let (low_a, high_a) = tubes.bounds(a);
+        for &b in order[place + 1..].iter().take_while(|&&b| low[b].x <= high_a.x) {
+            if low[b].y > high_a.y || low_a.y > tubes.bounds(b).1.y {
                 continue;
             }
             n_pairs += 1;
             if n_pairs > MOST_PAIRS {
-                return Overlaps { count, is_complete: false };
+                return false;
             }
-            count += usize::from(tubes.overlap(a.min(b), a.max(b)));
+            if let Some(meeting) = tubes.meeting(a.min(b), a.max(b)) {
+                visit(&meeting);
+            }
         }
     }
-    Overlaps { count, is_complete: true }
+    true
 }
 
-struct Tubes<'a> {
+/// The tubes of a layout.
+pub(super) struct Tubes<'a> {
     problem: &'a Problem<'a>,
     positions: &'a [DVec2],
     radius: Vec<f64>,
-    low: Vec<DVec2>,
-    high: Vec<DVec2>,
     /// Path from the root to each node.
     path: Vec<f64>,
     ancestors: Ancestors,
 }
 
 impl<'a> Tubes<'a> {
-    fn new(problem: &'a Problem, positions: &'a [DVec2]) -> Self {
+    pub(super) fn new(problem: &'a Problem, positions: &'a [DVec2]) -> Self {
         let n_nodes = positions.len();
         let nodes = problem.tree.nodes();
         let (mut radius, mut path) = (vec![0.0; n_nodes], vec![0.0; n_nodes]);
-        let (mut low, mut high) = (vec![DVec2::ZERO; n_nodes], vec![DVec2::ZERO; n_nodes]);
         for node in 1..n_nodes {
             let parent = problem.parent[node] as usize;
             radius[node] = 0.5 * (nodes[node].radius_mm + nodes[parent].radius_mm);
             path[node] = path[parent] + positions[node].distance(positions[parent]);
-            low[node] = positions[node].min(positions[parent]) - radius[node];
-            high[node] = positions[node].max(positions[parent]) + radius[node];
         }
-        Self { problem, positions, radius, low, high, path, ancestors: Ancestors::new(&problem.parent) }
+        Self { problem, positions, radius, path, ancestors: Ancestors::new(&problem.parent) }
     }
 
     fn segment(&self, node: usize) -> Segment {
         Segment { a: self.positions[self.problem.parent[node] as usize], b: self.positions[node] }
     }
 
-    /// Whether edges a < b overlap as defined above.
-    fn overlap(&self, a: usize, b: usize) -> bool {
+    /// Half the width of an edge.
+    pub(super) fn radius_mm(&self, edge: usize) -> f64 {
+        self.radius[edge]
+    }
+
+    /// The box of an edge's capsule.
+    fn bounds(&self, node: usize) -> (DVec2, DVec2) {
+        let Segment { a, b } = self.segment(node);
+        (a.min(b) - self.radius[node], a.max(b) + self.radius[node])
+    }
+
+    /// Edges a < b, if they have no common node and their capsules meet.
+    fn meeting(&self, a: usize, b: usize) -> Option<Meeting> {
         let (parent_a, parent_b) = (self.problem.parent[a] as usize, self.problem.parent[b] as usize);
         if parent_b == a || parent_a == parent_b {
-            return false;
+            return None;
         }
-        let reach = self.radius[a] + self.radius[b];
-        if segment_distance(&self.segment(a), &self.segment(b)) >= reach {
-            return false;
-        }
+        let distance_mm = segment_distance(&self.segment(a), &self.segment(b));
+        (distance_mm < self.radius[a] + self.radius[b]).then(|| self.relation(a, b, distance_mm))
+    }
+
+    /// What the tree says of edges a < b without a common node.
+    fn relation(&self, a: usize, b: usize, distance_mm: f64) -> Meeting {
+        let (parent_a, parent_b) = (self.problem.parent[a] as usize, self.problem.parent[b] as usize);
         let is_below = self.problem.tree.subtree(a).contains(&b);
         let parting = if is_below { a } else { self.ancestors.lowest_common(parent_a, parent_b) };
         let near_a = if is_below { self.path[a] } else { self.path[parent_a] };
-        let between = (near_a - self.path[parting]) + (self.path[parent_b] - self.path[parting]);
-        between > reach && between > 2.0 * self.junction_disc(parting, a, b)
+        let between_mm = (near_a - self.path[parting]) + (self.path[parent_b] - self.path[parting]);
+        let (disc_mm, branch_mm) = self.junction_disc(parting, a, b);
+        Meeting { distance_mm, reach_mm: self.radius[a] + self.radius[b], between_mm, disc_mm, branch_mm }
+    }
+
+    /// Whether edges a < b may not overlap, being far enough from where they part.
+    pub(super) fn must_part(&self, a: usize, b: usize) -> bool {
+        self.relation(a, b, 0.0).is_overlap()
     }
 
     /// The length in the plane of the branch to which a node belongs; that of the root, which has none, is 0.
@@ -109,8 +145,9 @@ impl<'a> Tubes<'a> {
         })
     }
 
-    /// The radius of the disc about `parting` inside which the tubes towards `a` and `b` overlap anyway.
-    fn junction_disc(&self, parting: usize, a: usize, b: usize) -> f64 {
+    /// The radius of the disc about `parting` inside which the tubes towards `a` and `b` overlap anyway, and the
+    /// length of the shorter branch, which it does not exceed.
+    fn junction_disc(&self, parting: usize, a: usize, b: usize) -> (f64, f64) {
         let towards = |node: usize| {
             let children = self.problem.tree.children(parting);
             let first_after = children.partition_point(|&child| child <= node);
@@ -128,12 +165,16 @@ impl<'a> Tubes<'a> {
         );
         let (r_a, r_b) = (self.radius[arm_a], self.radius[arm_b]);
         let gap = math::atan2(to_a.perp_dot(to_b).abs(), to_a.dot(to_b));
-        let disc = if gap < std::f64::consts::FRAC_PI_2 {
-            let (sin, cos) = math::sin_cos(gap);
-            (r_a * r_a + r_b * r_b + 2.0 * r_a * r_b * cos).sqrt() / sin.max(1e-9)
-        } else {
-            r_a + r_b
-        };
-        disc.min(self.branch_length(arm_a)).min(self.branch_length(arm_b))
+        (disc_radius(gap, r_a, r_b), self.branch_length(arm_a).min(self.branch_length(arm_b)))
+    }
+}
+
+/// How far from a fork tubes at the gap `gap_rad` run into each other.
+pub(super) fn disc_radius(gap_rad: f64, r_a: f64, r_b: f64) -> f64 {
+    if gap_rad < FRAC_PI_2 {
+        let (sin, cos) = math::sin_cos(gap_rad);
+        (r_a * r_a + r_b * r_b + 2.0 * r_a * r_b * cos).sqrt() / sin.max(1e-9)
+    } else {
+        r_a + r_b
     }
 }
