@@ -14,6 +14,7 @@ Examples:
   espalier run my.toml --from embed --set embed.w_angle=3    again from a stage on
   espalier embed out/airway --set embed.pso.freedom=s       one stage of a run folder
   espalier skeleton mask.nii.gz -o out/skeleton         one stage on files
+  espalier compare out/airway                           its methods side by side: table and figure
   espalier verify out/airway                            does everything hold that the folder says?
   espalier phantom airway -o phantoms/airway            test data with its truth
 
@@ -55,6 +56,8 @@ pub(crate) struct Common {
 pub(crate) enum Command {
     /// Run a whole pipeline: from a config, or from an input with every setting at its default
     Run(RunArguments),
+    /// Methods or runs side by side: one table, one figure
+    Compare(CompareArguments),
     /// Make a phantom with its truth: CT, mask and tree
     Phantom(PhantomArguments),
     /// CT or label map -> mask:  espalier volume CT -o DIR
@@ -89,6 +92,29 @@ pub(crate) struct RunArguments {
     /// End after this stage
     #[arg(long, value_name = "STAGE", value_parser = parse_stage)]
     pub(crate) to: Option<Stage>,
+}
+
+const COMPARE_HELP: &str = "\
+Writes into the folder: compare.tsv and compare.json (a row per run and method), compare.png and compare.svg (each tree
+in space, then every method's layout, main subtrees in the same colours), dictionary.tsv (what each column means).
+Which methods a run has is set by embed.methods; they share one set of targets and one energy.
+
+Examples:
+  espalier compare out/airway                            the methods of a run
+  espalier compare out/a out/b out/c -o out/abc          runs: rows that compare share tree and targets
+  espalier compare neuron.swc --set embed.pso.freedom=s  runs it up to the embedding first
+  espalier compare out/airway --set render.theme=dark    of finished runs, the pictures can be set";
+
+/// `espalier compare`.
+#[derive(Debug, Args)]
+#[command(after_help = COMPARE_HELP)]
+pub(crate) struct CompareArguments {
+    /// Run folders; or configs (.toml) and inputs, which are run first, each to a folder of its name in DIR
+    #[arg(required = true, value_name = "RUN|CONFIG")]
+    pub(crate) subjects: Vec<PathBuf>,
+    /// Where the results go
+    #[arg(short, long, value_name = "DIR", default_value = "out/compare")]
+    pub(crate) out: PathBuf,
 }
 
 /// `espalier phantom`.

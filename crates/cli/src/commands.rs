@@ -7,9 +7,13 @@ use std::process::ExitCode;
 use anyhow::anyhow;
 use espalier_model::Diagnose;
 use espalier_model::diagnose::Class;
-use espalier_pipeline::{Artifact, Config, Error, Loaded, Override, Request, Stage, Summary};
+use espalier_pipeline::{
+    Artifact, CompareRequest, Config, Error, Loaded, Override, Request, Stage, Subject, Summary,
+};
 
-use crate::args::{Arguments, Command, PhantomArguments, RunArguments, StageArguments, VerifyArguments};
+use crate::args::{
+    Arguments, Command, CompareArguments, PhantomArguments, RunArguments, StageArguments, VerifyArguments,
+};
 use crate::checks;
 use crate::progress::{self, Progress};
 
@@ -20,6 +24,7 @@ const FALLBACK_MEMORY_BYTES: u64 = 4 << 30;
 pub(crate) fn execute(arguments: &Arguments) -> anyhow::Result<()> {
     let summary = match &arguments.command {
         Command::Run(run) => run_pipeline(arguments, run)?,
+        Command::Compare(compare) => run_compare(arguments, compare)?,
         Command::Phantom(phantom) => make_phantom(arguments, phantom)?,
         Command::Volume(stage) => run_stage(arguments, stage, Stage::Volume)?,
         Command::Skeleton(stage) => run_stage(arguments, stage, Stage::Skeleton)?,
@@ -71,6 +76,29 @@ fn run_pipeline(arguments: &Arguments, run: &RunArguments) -> anyhow::Result<Sum
     perform(arguments, &request)
 }
 
+fn run_compare(arguments: &Arguments, compare: &CompareArguments) -> anyhow::Result<Summary> {
+    let overrides = &arguments.common.overrides;
+    let subject = |path: &PathBuf| {
+        if path.is_dir() {
+            Ok(Subject::Run(path.clone()))
+        } else {
+            load(path, overrides).map(|loaded| Subject::Config(Box::new(loaded)))
+        }
+    };
+    let request = CompareRequest {
+        subjects: compare.subjects.iter().map(subject).collect::<anyhow::Result<_>>()?,
+        out: compare.out.clone(),
+        overrides: overrides.clone(),
+        threads: arguments.common.threads.map(usize::from),
+        max_memory_bytes: arguments.common.max_memory.unwrap_or_else(half_of_memory),
+        data_dir: data_dir(),
+    };
+    let progress = Progress::new(arguments.common.quiet);
+    let compared = espalier_pipeline::compare(&request, &|event| progress.show(event))?;
+    progress::result(&compared.table);
+    Ok(compared.summary)
+}
+
 fn make_phantom(arguments: &Arguments, phantom: &PhantomArguments) -> anyhow::Result<Summary> {
     let mut overrides = vec![
         Override { key: "input.phantom".to_owned(), value: phantom.kind.clone() },
@@ -115,7 +143,7 @@ fn run_stage_of_folder(
     let out = stage.out.clone().unwrap_or_else(|| folder.to_owned());
     let mut request = Request { from: Some(which), to: Some(which), ..request(arguments, loaded, out) };
     if request.out != folder {
-        let known = which.reads().iter().chain(&[Artifact::Traced]);
+        let known = which.reads().iter().chain(&[Artifact::Traced, Artifact::Comparison]);
         let files = known.map(|artifact| (*artifact, folder.join(artifact.file())));
         request.files = files.filter(|(_, file)| file.exists()).collect();
         if request.files.contains_key(&Artifact::Mask) {

@@ -69,9 +69,10 @@ fn help_teaches_and_succeeds() {
     let output = espalier(folder.path(), &["--help"]);
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert_eq!(output.status.code(), Some(0));
-    for command in
-        ["run", "phantom", "volume", "skeleton", "radius", "tree", "views", "embed", "render", "verify"]
-    {
+    for command in [
+        "run", "compare", "phantom", "volume", "skeleton", "radius", "tree", "views", "embed", "render",
+        "verify",
+    ] {
         assert!(text.contains(&format!("\n  {command} ")), "no {command} in: {text}");
     }
     assert!(text.contains("Exit codes:"));
@@ -361,4 +362,92 @@ fn manual_edits() {
     assert_eq!(run(&["run", "fork.toml", "-o", "out", "--from", "embed"]), plain);
     run(&["embed", "again", "--set", "embed.edits="]);
     assert_eq!(run(&["render", "again"]), plain);
+}
+
+/// A fork with a bend in each arm, as SWC in µm.
+const SMALL_TREE: &str = "\
+1 0 0 0 0 2 -1\n2 0 0 20 0 2 1\n3 0 15 30 5 1 2\n4 0 20 45 9 1 3\n5 0 -12 31 -6 1 2\n6 0 -20 40 3 1 5\n";
+
+/// Runs the tree up to the embedding with these settings.
+fn embedded(folder: &Path, out: &str, settings: &[&str]) {
+    let mut arguments = vec!["run", "tree.swc", "-o", out, "--to", "embed", "-q"];
+    arguments.extend(["--set", "embed.pso.particles=16", "--set", "embed.pso.iterations=3"]);
+    arguments.extend(settings.iter().flat_map(|setting| ["--set", setting]));
+    let output = espalier(folder, &arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+}
+
+#[test]
+fn two_runs_are_compared() {
+    let folder = folder_with("tree.swc", SMALL_TREE.as_bytes());
+    let read = |file: &str| fs::read_to_string(folder.path().join(file)).expect(file);
+    embedded(folder.path(), "a", &[]);
+    embedded(folder.path(), "b", &["embed.targets=projected"]);
+    let output = espalier(folder.path(), &["compare", "a", "b", "-o", "both", "-q"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let n_methods = read("a/compare.tsv").lines().count() - 1;
+    assert!(n_methods >= 5 && text.contains("both/compare.png"), "{text}");
+    assert_eq!(
+        text.lines().filter(|line| line.starts_with("a ") || line.starts_with("b ")).count(),
+        2 * n_methods
+    );
+    assert_eq!(
+        text.lines().filter(|line| line.contains(" > ") && !line.starts_with('*')).count(),
+        2,
+        "{text}"
+    );
+
+    // The rows are those of the runs, with their names before them.
+    let own: Vec<String> = read("a/compare.tsv").lines().skip(1).map(|line| format!("a\t{line}")).collect();
+    let table = read("both/compare.tsv");
+    assert_eq!(table.lines().skip(1).take(n_methods).collect::<Vec<_>>(), own);
+    let runs = espalier_model::ComparedRuns::from_json(&read("both/compare.json")).expect("our own file");
+    assert_eq!(runs.to_tsv(), table);
+    let dictionary = read("both/dictionary.tsv");
+    for column in table.lines().next().expect("a header").split('\t') {
+        assert!(dictionary.contains(&format!("\t{column}\t")), "{column} is not explained");
+    }
+    // No result knows a time: the same bytes again, on one thread.
+    let again = espalier(folder.path(), &["compare", "a", "b", "-o", "again", "-q", "--threads", "1"]);
+    assert_eq!(again.status.code(), Some(0), "{}", stderr(&again));
+    assert_eq!(read("again/SHA256SUMS"), read("both/SHA256SUMS"));
+}
+
+#[test]
+fn a_config_is_run_before_it_is_compared() {
+    let folder = folder_with("tree.swc", SMALL_TREE.as_bytes());
+    let output =
+        espalier(folder.path(), &["compare", "tree.swc", "--set", "embed.pso.iterations=2", "-o", "c"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(
+        folder.path().join("c/tree/embedding.json").exists() && folder.path().join("c/compare.svg").exists()
+    );
+    assert!(!folder.path().join("c/tree/planar.png").exists(), "no pictures of its own");
+}
+
+#[test]
+fn what_cannot_be_compared_is_refused() {
+    let folder = folder_with("tree.swc", SMALL_TREE.as_bytes());
+    embedded(folder.path(), "a", &[]);
+    fs::create_dir(folder.path().join("empty")).expect("folder");
+    refused(&folder, &["compare", "empty", "-o", "x"], 74, &["empty holds no run", "hint", "--to embed"]);
+    refused(&folder, &["compare", "nowhere", "-o", "x"], 74, &["nowhere"]);
+    refused(&folder, &["compare", "a", "-o", "a"], 2, &["a is a run folder", "hint", "-o"]);
+    refused(
+        &folder,
+        &["compare", "a", "--set", "embed.w_angle=1", "-o", "x"],
+        2,
+        &["--set embed.w_angle", "render.*"],
+    );
+    refused(&folder, &["compare"], 2, &["RUN|CONFIG"]);
+    // A layout that was edited afterwards is found out, with or without the digests.
+    let file = folder.path().join("a/compare.json");
+    let text = fs::read_to_string(&file).expect("text");
+    fs::write(&file, text.replacen("\"crossings\":0", "\"crossings\":1", 1)).expect("write");
+    refused(&folder, &["compare", "a", "-o", "x"], 8, &["a/compare.json", "SHA256SUMS"]);
+    fs::remove_file(folder.path().join("a/SHA256SUMS")).expect("remove");
+    refused(&folder, &["compare", "a", "-o", "x"], 8, &["states 1 crossings, its coordinates have 0"]);
+    fs::remove_file(&file).expect("remove");
+    refused(&folder, &["compare", "a", "-o", "x"], 74, &["there is no compare.json"]);
 }

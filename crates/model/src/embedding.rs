@@ -3,6 +3,7 @@
 mod comparison;
 mod file;
 mod losses;
+mod runs;
 mod widths;
 
 use glam::DVec2;
@@ -10,6 +11,7 @@ use glam::DVec2;
 pub use comparison::{CompareCell, CompareColumn, ComparedLayout, Comparison, compare_columns};
 pub use file::NODE_COLUMNS;
 pub use losses::{Better, LossColumn, Losses};
+pub use runs::{ComparedRun, ComparedRuns, RUN_COLUMN};
 pub use widths::{WidthMode, Widths};
 
 use crate::edits::Edit;

@@ -40,9 +40,9 @@ mod volume;
 pub use diagnose::Diagnose;
 pub use edits::{Edit, EditError, Edits};
 pub use embedding::{
-    Better, Certificate, CompareCell, CompareColumn, ComparedLayout, Comparison, EditRecord, Embedding,
-    Energy, LossColumn, Losses, MethodRow, NODE_COLUMNS, Pose, TargetKind, Targets, Termination, TracePoint,
-    WidthMode, Widths, compare_columns,
+    Better, Certificate, CompareCell, CompareColumn, ComparedLayout, ComparedRun, ComparedRuns, Comparison,
+    EditRecord, Embedding, Energy, LossColumn, Losses, MethodRow, NODE_COLUMNS, Pose, RUN_COLUMN, TargetKind,
+    Targets, Termination, TracePoint, WidthMode, Widths, compare_columns,
 };
 pub use grid::{Grid, GridError};
 pub use ledger::{LEDGER_COLUMNS, Ledger, LedgerEntry, LedgerKind};

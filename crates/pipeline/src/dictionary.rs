@@ -3,7 +3,7 @@
 //! Each table declares its columns once, where it is made; this is where they are put together.
 
 use espalier_model::table::{Column, dictionary};
-use espalier_model::{LEDGER_COLUMNS, NODE_COLUMNS, SPHERE_COLUMNS, compare_columns};
+use espalier_model::{LEDGER_COLUMNS, NODE_COLUMNS, RUN_COLUMN, SPHERE_COLUMNS, compare_columns};
 
 use crate::provenance::{INPUT_COLUMNS, TIMING_COLUMNS};
 use crate::steps::CONVERGENCE_COLUMNS;
@@ -21,4 +21,12 @@ pub(crate) fn text() -> String {
         ("provenance/inputs.tsv", &INPUT_COLUMNS),
         ("provenance/timings.tsv", &TIMING_COLUMNS),
     ])
+}
+
+/// The text of `dictionary.tsv` beside a comparison of runs.
+pub(crate) fn of_runs() -> String {
+    let columns = compare_columns();
+    let columns: Vec<Column> =
+        std::iter::once(RUN_COLUMN).chain(columns.iter().map(|column| column.column)).collect();
+    dictionary(&[("compare.tsv", &columns)])
 }

@@ -49,6 +49,28 @@ pub enum Error {
         /// The file.
         path: PathBuf,
     },
+    /// A folder that is to be compared holds no run.
+    #[error("{folder} holds no run with an embedding: there is no {missing}", folder = folder.display())]
+    NoRun {
+        /// The folder.
+        folder: PathBuf,
+        /// The file that is not there.
+        missing: &'static str,
+    },
+    /// Results would be written among those of a run.
+    #[error("{folder} is a run folder; its own results would be overwritten", folder = folder.display())]
+    RunInTheWay {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// A setting that cannot be changed after the fact.
+    #[error("--set {key}: {folder} was made with other settings already", folder = folder.display())]
+    Settled {
+        /// The key.
+        key: String,
+        /// The run folder.
+        folder: PathBuf,
+    },
     /// An embedding whose certificate does not hold.
     #[error("{path} states {stated} crossings, its coordinates have {found}", path = path.display())]
     Certificate {
@@ -180,6 +202,9 @@ impl Diagnose for Error {
             Self::Config(error) => error.code(),
             Self::Stage { cause, .. } | Self::File { cause, .. } => cause.code(),
             Self::MissingArtifact { .. } => "E-RUN-MISSING-FILE",
+            Self::NoRun { .. } => "E-COMPARE-NO-RUN",
+            Self::RunInTheWay { .. } => "E-COMPARE-FOLDER",
+            Self::Settled { .. } => "E-COMPARE-SETTINGS",
             Self::Altered { .. } => "E-RUN-ALTERED-FILE",
             Self::Certificate { .. } => "E-RUN-CERTIFICATE",
             Self::Unverified { .. } => "E-VERIFY",
@@ -205,8 +230,12 @@ impl Diagnose for Error {
             | Self::Input { .. }
             | Self::OtherSettings { .. }
             | Self::OtherInput { .. }
+            | Self::RunInTheWay { .. }
+            | Self::Settled { .. }
             | Self::Threads { .. } => Class::Usage,
-            Self::MissingArtifact { .. } | Self::Read { .. } | Self::Write { .. } => Class::Io,
+            Self::NoRun { .. } | Self::MissingArtifact { .. } | Self::Read { .. } | Self::Write { .. } => {
+                Class::Io
+            }
             Self::Altered { .. } | Self::Certificate { .. } | Self::Unverified { .. } => Class::Uncertified,
             Self::TooLarge { .. } => Class::Limit,
             Self::Create { .. } => Class::CannotCreate,
@@ -220,6 +249,9 @@ impl Diagnose for Error {
             Self::Stage { cause, .. } | Self::File { cause, .. } => cause.hint(),
             Self::Unverified { .. } => "use none of it; make it again with espalier run".to_owned(),
             Self::Certificate { .. } => "make the embedding again with espalier embed".to_owned(),
+            Self::NoRun { .. } => "run it with this version, at least up to --to embed".to_owned(),
+            Self::RunInTheWay { .. } => "choose another folder with -o".to_owned(),
+            Self::Settled { .. } => "of a finished run only render.* can be changed; or compare its config".to_owned(),
             Self::MissingArtifact { .. } => "start from an earlier stage with --from, or name the file".to_owned(),
             Self::Altered { .. } => {
                 "run the stage that makes it again; or, if the edit is meant, give the file to the stage's own \

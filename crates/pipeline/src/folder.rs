@@ -20,8 +20,8 @@ pub(crate) struct RunFolder {
     digests: BTreeMap<String, String>,
     /// The folders that this run made, the innermost first.
     made: Vec<PathBuf>,
-    /// The system releases the lock with the handle, however the process ends.
-    _lock: File,
+    /// The system releases the lock with the handle, however the process ends. None for a folder that is only read.
+    _lock: Option<File>,
 }
 
 impl RunFolder {
@@ -43,7 +43,17 @@ impl RunFolder {
             Err(TryLockError::Error(source)) => return Err(create(source)),
         }
         let digests = read_digests(&path.join(DIGEST_FILE));
-        Ok(Self { path: path.to_owned(), digests, made, _lock: lock })
+        Ok(Self { path: path.to_owned(), digests, made, _lock: Some(lock) })
+    }
+
+    /// A folder to read from, without a lock: nothing is written to it.
+    pub(crate) fn to_read(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            digests: read_digests(&path.join(DIGEST_FILE)),
+            made: Vec::new(),
+            _lock: None,
+        }
     }
 
     /// Removes the folder if this run made it and has put nothing into it.

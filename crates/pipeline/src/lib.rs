@@ -7,6 +7,7 @@
 //! | hand-over data, from memory or from the run folder | `artifacts` |
 //! | what each stage does with them | `steps` |
 //! | the loop over the stages | [`run`](mod@run) |
+//! | methods and runs side by side | [`compare`](mod@compare) |
 //! | the run folder: atomic files, digests, one lock | `folder` |
 //! | how a result came about, what each method cost | `provenance`, `methods` |
 //! | what the columns of the tables mean | `dictionary` |
@@ -34,6 +35,7 @@ pub mod stage;
 mod steps;
 mod verify;
 
+pub use compare::{CompareRequest, Compared, Subject, compare};
 pub use config::{Config, ConfigError, Loaded, Override};
 pub use error::Error;
 pub use espalier_verify::{Check, Outcome};

@@ -49,6 +49,7 @@ pub(crate) const TIMING_COLUMNS: [Column; 4] = [
 
 const INPUTS_FILE: &str = "provenance/inputs.tsv";
 const RUN_FILE: &str = "provenance/run.json";
+const TIMINGS_FILE: &str = "provenance/timings.tsv";
 /// The roles of files in `provenance/inputs.tsv`.
 const INPUT: &str = "input";
 const EDITS: &str = "edits";
@@ -174,6 +175,10 @@ pub(crate) fn write_run(
     folder.write_aside(RUN_FILE, json.as_bytes())?;
     // The peak is of the whole program until the end of the stage: the system keeps no other.
     let mut table = Table::with(&TIMING_COLUMNS);
+    let first = costs.first().map(|cost| cost.stage);
+    for cells in timings(folder).iter().filter(|cells| Stage::from_name(&cells[0]) < first) {
+        table.row_of(cells);
+    }
     for cost in costs {
         let parts = cost.parts.iter().map(|part| (part.name.as_str(), part.seconds, part.peak_mb));
         for (method, seconds, peak_mb) in parts.chain([("n/a", cost.seconds, cost.peak_mb)]) {
@@ -181,7 +186,24 @@ pub(crate) fn write_run(
             table.row(&[&cost.stage, &method, &format!("{seconds:.3}"), &peak_mb]);
         }
     }
-    folder.write_aside("provenance/timings.tsv", table.into_string().as_bytes())
+    folder.write_aside(TIMINGS_FILE, table.into_string().as_bytes())
+}
+
+/// The seconds of each part of a stage in a run folder; none where the folder has no such table.
+pub(crate) fn method_seconds(folder: &RunFolder, stage: Stage) -> Vec<(String, f64)> {
+    let of_method = |[of, method, seconds, _]: [String; 4]| {
+        let is_method = of == stage.name() && method != "n/a";
+        Some((method, seconds.parse().ok()?)).filter(|_| is_method)
+    };
+    timings(folder).into_iter().filter_map(of_method).collect()
+}
+
+/// The rows of the times that a folder has, by stages of this version.
+fn timings(folder: &RunFolder) -> Vec<[String; 4]> {
+    let text = std::fs::read_to_string(folder.path().join(TIMINGS_FILE)).unwrap_or_default();
+    let cells = |line: &str| line.split('\t').map(str::to_owned).collect::<Vec<_>>().try_into().ok();
+    let rows = text.lines().skip(1).filter_map(cells);
+    rows.filter(|cells: &[String; 4]| Stage::from_name(&cells[0]).is_some()).collect()
 }
 
 /// The largest memory that this process has held so far, in MB, where the system tells it.

@@ -12,7 +12,8 @@ use crate::error::Error;
 use crate::folder::RunFolder;
 use crate::stage::Stage;
 
-const FILE: &str = "provenance/config.resolved.toml";
+/// Where they stand.
+pub(crate) const FILE: &str = "provenance/config.resolved.toml";
 
 /// What identifies a run as a whole: with another of these, no earlier result is of the same run.
 const IDENTITY: [&str; 3] = ["schema", "seed", "input"];

@@ -33,12 +33,16 @@ const LEAST_PANEL: f64 = 21.0;
 const GAP: f64 = 2.2;
 /// Space around a tree in its panel, in layout units.
 const RIM: f64 = 2.2;
+/// The same for the letters to its left and right, on top of that.
+const SIDE: f64 = 3.3;
 /// Line height over font size.
 const LEADING: f64 = 1.4;
 /// Height of the key below a section, in layout units.
 const KEY: f64 = 5.0;
 /// Height of all panels over the width of the page: a figure as wide as a screen.
 const MOST_HEIGHT: f64 = 0.75;
+/// The same of each tree where there are several.
+const SECTION_HEIGHT: f64 = 0.55;
 /// From this many on, the rings of crossings are smaller, so as not to hide the tree.
 const MANY_CROSSINGS: usize = 40;
 /// Edges in small panels are at least this share of `min_width_px` wide.
@@ -155,13 +159,16 @@ impl Artist<'_> {
     fn lay_out<'t>(&self, sections: &[Section<'t>]) -> Result<Sheet<'t>, Error> {
         let said = Heading {
             title: self.params.title.clone(),
-            verdict: vec!["methods side by side, all at one scale and scored by one energy".to_owned()],
+            verdict: vec![match sections {
+                [_, _, ..] => "methods side by side; each tree at one scale, scored by one energy".to_owned(),
+                _ => "methods side by side, all at one scale and scored by one energy".to_owned(),
+            }],
             facts: Vec::new(),
         };
         let (group, heading_px) = furniture::heading(&self.face, &said, self.params.width_px, &self.colors);
         let mut sheet =
             Sheet { frames: Vec::new(), groups: vec![group], height_px: self.margin_px() + heading_px };
-        let share = MOST_HEIGHT / sections.len().max(1) as f64;
+        let share = if sections.len() > 1 { SECTION_HEIGHT } else { MOST_HEIGHT };
         for section in sections {
             self.lay_out_section(section, share, &mut sheet)?;
         }
@@ -195,6 +202,7 @@ impl Artist<'_> {
             gap_px: GAP * unit,
             text_px: (LEADING * (TITLE + N_NOTES as f64 * NOTE) + GAP) * unit,
             rim_px: RIM * unit,
+            first_px: 2.0 * SIDE * unit,
         };
         let tiling = Tiling::of(&sizes_mm, &room);
         let first_frame = sheet.frames.len();
@@ -354,7 +362,7 @@ impl Artist<'_> {
         let low = frame.page.px(DVec2::new(low_mm.x, high_mm.y)) - rim;
         let high = frame.page.px(DVec2::new(high_mm.x, low_mm.y)) + rim;
         // Letters to the left and right need more room than those above and below.
-        let side = DVec2::new(1.5 * rim.x, 0.0);
+        let side = DVec2::new(SIDE * self.unit_px(), 0.0);
         let [panel_low, panel_high] = frame.page.area;
         Page { area: [(low - side).max(panel_low), (high + side).min(panel_high)], ..frame.page }
     }

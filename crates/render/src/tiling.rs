@@ -23,6 +23,8 @@ pub(crate) struct Room {
     pub text_px: f64,
     /// Space around a tree inside of its panel.
     pub rim_px: f64,
+    /// What the first panel needs beside its tree, left and right together.
+    pub first_px: f64,
 }
 
 /// The columns and the scale.
@@ -36,6 +38,8 @@ pub(crate) struct Tiling {
     pub px_per_mm: f64,
 }
 
+/// The least height of all trees together, as a share of the width.
+const LEAST_SHARE: f64 = 0.1;
 /// A tree smaller than this has no scale of its own, mm.
 const SMALLEST_MM: f64 = 1e-12;
 
@@ -52,15 +56,19 @@ impl Tiling {
     fn with(n_columns: usize, sizes_mm: &[DVec2], room: &Room) -> Self {
         let n = n_columns as f64;
         let panel_px = (room.width_px + room.gap_px) / n - room.gap_px;
-        let widest_mm = sizes_mm.iter().fold(SMALLEST_MM, |widest, size| widest.max(size.x));
+        let by_width = sizes_mm.iter().enumerate().map(|(idx, size)| {
+            let beside_px = 2.0 * room.rim_px + if idx == 0 { room.first_px } else { 0.0 };
+            (panel_px - beside_px).max(1.0) / size.x.max(SMALLEST_MM)
+        });
+        let by_width = by_width.fold(f64::INFINITY, f64::min);
         let (mut rows_mm, mut text_px) = (0.0, 0.0);
         for row in sizes_mm.chunks(n_columns) {
             rows_mm += highest_mm(row);
             text_px += room.text_px + 2.0 * room.rim_px;
         }
-        let by_width = (panel_px - 2.0 * room.rim_px).max(1.0) / widest_mm;
-        // A page of nothing but text would have no room left: then the trees get a panel's width at least.
-        let by_height = (room.height_px - text_px).max(0.5 * panel_px) / f64::max(rows_mm, SMALLEST_MM);
+        // Where text takes the height, the trees still get a share of the width.
+        let for_trees_px = (room.height_px - text_px).max(LEAST_SHARE * room.width_px);
+        let by_height = for_trees_px / f64::max(rows_mm, SMALLEST_MM);
         Self { n_columns, panel_px, px_per_mm: by_width.min(by_height) }
     }
 
@@ -78,8 +86,15 @@ fn highest_mm(row: &[DVec2]) -> f64 {
 mod tests {
     use super::*;
 
-    const ROOM: Room =
-        Room { width_px: 1000.0, height_px: 1000.0, least_px: 200.0, gap_px: 0.0, text_px: 0.0, rim_px: 0.0 };
+    const ROOM: Room = Room {
+        width_px: 1000.0,
+        height_px: 1000.0,
+        least_px: 200.0,
+        gap_px: 0.0,
+        text_px: 0.0,
+        rim_px: 0.0,
+        first_px: 0.0,
+    };
 
     #[test]
     fn wide_trees_stand_in_rows_and_high_ones_in_columns() {
@@ -94,7 +109,12 @@ mod tests {
     #[test]
     fn there_is_always_a_scale() {
         for sizes in [vec![], vec![DVec2::ZERO; 3], vec![DVec2::new(0.0, 5.0); 200]] {
-            for room in [ROOM, Room { text_px: 900.0, ..ROOM }, Room { width_px: 10.0, ..ROOM }] {
+            for room in [
+                ROOM,
+                Room { first_px: 5000.0, ..ROOM },
+                Room { text_px: 900.0, ..ROOM },
+                Room { width_px: 10.0, ..ROOM },
+            ] {
                 let tiling = Tiling::of(&sizes, &room);
                 assert!(tiling.px_per_mm.is_finite() && tiling.px_per_mm > 0.0, "{tiling:?}");
             }
