@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
-use espalier_pipeline::{Override, Stage};
+use espalier_pipeline::{Axis, Override, Stage};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -16,6 +16,7 @@ Examples:
   espalier skeleton mask.nii.gz -o out/skeleton         one stage on files
   espalier compare out/airway                           its methods side by side: table and figure
   espalier verify out/airway                            does everything hold that the folder says?
+  espalier sweep my.toml --over embed.w_length=0.5,1,2  losses against a setting: table and plot
   espalier phantom airway -o phantoms/airway            test data with its truth
 
 Exit codes:
@@ -58,6 +59,8 @@ pub(crate) enum Command {
     Run(RunArguments),
     /// Methods or runs side by side: one table, one figure
     Compare(CompareArguments),
+    /// A config at many settings: a table and a plot of the losses
+    Sweep(SweepArguments),
     /// Make a phantom with its truth: CT, mask and tree
     Phantom(PhantomArguments),
     /// CT or label map -> mask:  espalier volume CT -o DIR
@@ -117,6 +120,32 @@ pub(crate) struct CompareArguments {
     pub(crate) out: PathBuf,
 }
 
+const SWEEP_HELP: &str = "\
+Embeds the config at every combination of the values; stages that no key changes run once. Writes into the folder:
+sweep.tsv (a row per combination: its values, the row of its embedding as in compare.tsv, or the reason why there is
+none), sweep.png and sweep.svg (losses against the first key, one line for each combination of the others), base/ and
+runs/NNN/ (the stages' own files). Energies at different weights do not compare; losses do.
+
+Examples:
+  espalier sweep neuron.swc --over embed.w_length=0.5,1,2,4
+  espalier sweep my.toml --over embed.w_length=0.5,1,2,4 --over embed.w_angle=1,2,4 -o out/weights
+  espalier sweep my.toml --over embed.method=radial,marino,solver     words need no quotes
+  espalier sweep my.toml --over 'volume.seed_voxel=[1,2,3],[4,5,6]'   commas inside brackets do not part values";
+
+/// `espalier sweep`.
+#[derive(Debug, Args)]
+#[command(after_help = SWEEP_HELP)]
+pub(crate) struct SweepArguments {
+    /// A config (.toml), or an input: .nii, .nii.gz, .swc
+    pub(crate) config_or_input: PathBuf,
+    /// A key and its values; may be given many times, for all combinations
+    #[arg(long = "over", value_name = "KEY=V1,V2,…", required = true, value_parser = parse_axis)]
+    pub(crate) axes: Vec<Axis>,
+    /// Where the results go [default: out/NAME-sweep]
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
 /// `espalier phantom`.
 #[derive(Debug, Args)]
 pub(crate) struct PhantomArguments {
@@ -160,6 +189,24 @@ fn parse_override(text: &str) -> Result<Override, String> {
     Ok(Override { key: key.trim().to_owned(), value: value.trim().to_owned() })
 }
 
+fn parse_axis(text: &str) -> Result<Axis, String> {
+    let complaint = "write KEY=V1,V2,…, such as embed.w_length=0.5,1,2,4";
+    let (key, values) = text.split_once('=').ok_or(complaint)?;
+    let (mut depth, mut parts) = (0_i32, vec![String::new()]);
+    for letter in values.chars() {
+        depth += i32::from(matches!(letter, '[' | '{')) - i32::from(matches!(letter, ']' | '}'));
+        match parts.last_mut() {
+            Some(part) if letter != ',' || depth > 0 => part.push(letter),
+            _ => parts.push(String::new()),
+        }
+    }
+    let values: Vec<String> = parts.iter().map(|part| part.trim().to_owned()).collect();
+    if key.trim().is_empty() || values.iter().any(String::is_empty) {
+        return Err(complaint.to_owned());
+    }
+    Ok(Axis { key: key.trim().to_owned(), values })
+}
+
 fn parse_stage(text: &str) -> Result<Stage, String> {
     Stage::from_name(text).ok_or_else(|| {
         let names: Vec<&str> = Stage::ALL.iter().map(|stage| stage.name()).collect();
@@ -190,6 +237,16 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn axes() {
+        let values = |text: &str| parse_axis(text).map(|axis| axis.values);
+        assert_eq!(values("embed.w_length=0.5, 1,2"), Ok(["0.5", "1", "2"].map(str::to_owned).to_vec()));
+        assert_eq!(values("a=[1,2],[3,4]"), Ok(["[1,2]", "[3,4]"].map(str::to_owned).to_vec()));
+        for text in ["embed.w_length", "embed.w_length=", "=1,2", "a=1,,2"] {
+            assert!(values(text).is_err(), "{text}");
+        }
     }
 
     #[test]

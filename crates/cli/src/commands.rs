@@ -8,11 +8,12 @@ use anyhow::anyhow;
 use espalier_model::Diagnose;
 use espalier_model::diagnose::Class;
 use espalier_pipeline::{
-    Artifact, CompareRequest, Config, Error, Loaded, Override, Request, Stage, Subject, Summary,
+    Artifact, CompareRequest, Config, Error, Loaded, Override, Request, Stage, Subject, Summary, SweepRequest,
 };
 
 use crate::args::{
-    Arguments, Command, CompareArguments, PhantomArguments, RunArguments, StageArguments, VerifyArguments,
+    Arguments, Command, CompareArguments, PhantomArguments, RunArguments, StageArguments, SweepArguments,
+    VerifyArguments,
 };
 use crate::checks;
 use crate::progress::{self, Progress};
@@ -25,6 +26,7 @@ pub(crate) fn execute(arguments: &Arguments) -> anyhow::Result<()> {
     let summary = match &arguments.command {
         Command::Run(run) => run_pipeline(arguments, run)?,
         Command::Compare(compare) => run_compare(arguments, compare)?,
+        Command::Sweep(sweep) => run_sweep(arguments, sweep)?,
         Command::Phantom(phantom) => make_phantom(arguments, phantom)?,
         Command::Volume(stage) => run_stage(arguments, stage, Stage::Volume)?,
         Command::Skeleton(stage) => run_stage(arguments, stage, Stage::Skeleton)?,
@@ -97,6 +99,22 @@ fn run_compare(arguments: &Arguments, compare: &CompareArguments) -> anyhow::Res
     let compared = espalier_pipeline::compare(&request, &|event| progress.show(event))?;
     progress::result(&compared.table);
     Ok(compared.summary)
+}
+
+fn run_sweep(arguments: &Arguments, sweep: &SweepArguments) -> anyhow::Result<Summary> {
+    let request = SweepRequest {
+        config_or_input: sweep.config_or_input.clone(),
+        overrides: arguments.common.overrides.clone(),
+        axes: sweep.axes.clone(),
+        out: sweep.out.clone(),
+        threads: arguments.common.threads.map(usize::from),
+        max_memory_bytes: arguments.common.max_memory.unwrap_or_else(half_of_memory),
+        data_dir: data_dir(),
+    };
+    let progress = Progress::new(arguments.common.quiet);
+    let swept = espalier_pipeline::sweep(&request, &|event| progress.show(event))?;
+    progress::result(&swept.table);
+    Ok(swept.summary)
 }
 
 fn make_phantom(arguments: &Arguments, phantom: &PhantomArguments) -> anyhow::Result<Summary> {
@@ -210,14 +228,7 @@ fn perform(arguments: &Arguments, request: &Request) -> anyhow::Result<Summary> 
 
 /// A config file, or an input with every setting at its default.
 fn load(path: &Path, overrides: &[Override]) -> anyhow::Result<Loaded> {
-    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
-        let bytes = std::fs::read(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
-        let text = String::from_utf8(bytes).map_err(|_| anyhow!("{} is not UTF-8 text", path.display()))?;
-        let config = Config::parse(&text, path, overrides).map_err(Error::from)?;
-        let base_dir = path.parent().unwrap_or(Path::new("")).to_owned();
-        return Ok(Loaded { config, base_dir });
-    }
-    load_input(path, overrides)
+    Ok(Loaded::read(path, overrides)?)
 }
 
 fn load_input(path: &Path, overrides: &[Override]) -> anyhow::Result<Loaded> {

@@ -76,6 +76,12 @@ impl Progress {
                 finish(&mut bar);
                 line(&format!("{stage:<9}{seconds:>6.1} s  {text}"));
             }
+            Event::Combination { done, total, line: text } => {
+                finish(&mut bar);
+                if !self.is_quiet {
+                    line(&format!("{done:>3}/{total}  {text}"));
+                }
+            }
             Event::Stopped { kept, out } => {
                 finish(&mut bar);
                 line(&what_is_kept(&kept, &out));

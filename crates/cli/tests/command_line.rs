@@ -70,8 +70,8 @@ fn help_teaches_and_succeeds() {
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert_eq!(output.status.code(), Some(0));
     for command in [
-        "run", "compare", "phantom", "volume", "skeleton", "radius", "tree", "views", "embed", "render",
-        "verify",
+        "run", "compare", "sweep", "phantom", "volume", "skeleton", "radius", "tree", "views", "embed",
+        "render", "verify",
     ] {
         assert!(text.contains(&format!("\n  {command} ")), "no {command} in: {text}");
     }
@@ -450,4 +450,71 @@ fn what_cannot_be_compared_is_refused() {
     refused(&folder, &["compare", "a", "-o", "x"], 8, &["states 1 crossings, its coordinates have 0"]);
     fs::remove_file(&file).expect("remove");
     refused(&folder, &["compare", "a", "-o", "x"], 74, &["there is no compare.json"]);
+}
+
+#[test]
+fn two_keys_are_swept() {
+    let folder = folder_with("tree.swc", SMALL_TREE.as_bytes());
+    let read = |file: &str| fs::read_to_string(folder.path().join(file)).expect(file);
+    let sweep = |out: &str, threads: &str| {
+        let axes = ["--over", "embed.w_length=0.5,-1,2", "--over", "embed.method=radial,solver"];
+        let small = ["--set", "embed.pso.particles=16", "--set", "embed.pso.iterations=2", "-q"];
+        let arguments =
+            [&["sweep", "tree.swc", "-o", out, "--threads", threads], &axes[..], &small[..]].concat();
+        espalier(folder.path(), &arguments)
+    };
+    let output = sweep("s", "2");
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let table = read("s/sweep.tsv");
+    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split('\t').collect()).collect();
+    assert_eq!(rows[0][..5], ["combination", "embed.w_length", "embed.method", "method", "crossings"]);
+    assert_eq!(rows.len(), 7);
+    for (row, [length, method]) in rows[1..].iter().zip(
+        ["0.5", "-1", "2"].iter().flat_map(|length| ["radial", "solver"].map(|method| [*length, method])),
+    ) {
+        assert_eq!(row[1..3], [length, method]);
+        let error = row[row.len() - 1];
+        if length == "-1" {
+            assert!(row[3] == "n/a" && error.contains("must be from 0 to 1e6, is -1"), "{row:?}");
+        } else {
+            assert!(row[4] == "0" && error.is_empty(), "{row:?}");
+        }
+    }
+    // A row is what a run with those settings comes to.
+    embedded(folder.path(), "alone", &["embed.w_length=2", "embed.method=radial", "embed.pso.iterations=2"]);
+    let chosen = espalier_model::swc::read_tree(&read("alone/tree.swc")).expect("a tree");
+    let comparison =
+        espalier_model::Comparison::from_json(&read("alone/compare.json"), &chosen).expect("a file");
+    let row = &comparison.layouts[comparison.chosen].row;
+    let own = espalier_model::MethodRow::to_tsv(std::slice::from_ref(row));
+    assert_eq!(own.lines().nth(1).expect("a row"), rows[5][3..rows[5].len() - 1].join("\t"));
+    // What the combinations share is there once.
+    assert!(folder.path().join("s/base/views.json").exists());
+    assert!(!folder.path().join("s/runs/001/views.json").exists());
+    for file in ["s/sweep.png", "s/sweep.svg"] {
+        assert!(folder.path().join(file).exists(), "{file}");
+    }
+    let dictionary = read("s/dictionary.tsv");
+    assert!(rows[0].iter().all(|column| dictionary.contains(&format!("\t{column}\t"))));
+    let again = sweep("again", "1");
+    assert_eq!(again.status.code(), Some(0), "{}", stderr(&again));
+    assert_eq!(read("again/SHA256SUMS"), read("s/SHA256SUMS"));
+}
+
+#[test]
+fn a_sweep_in_vain_is_refused() {
+    let folder = folder_with("tree.swc", SMALL_TREE.as_bytes());
+    let refuse = |over: &[&str], fragments: &[&str]| {
+        let mut arguments = vec!["sweep", "tree.swc", "-o", "x"];
+        arguments.extend(over.iter().flat_map(|axis| ["--over", axis]));
+        refused(&folder, &arguments, 2, fragments);
+    };
+    refuse(&["embed.w_lenght=1,2"], &["w_lenght", "did you mean w_length?"]);
+    refuse(&["embed.w_length="], &["KEY=V1,V2"]);
+    refuse(&[], &["--over"]);
+    refuse(&["embed.w_length=-1,-2"], &["--set embed.w_length=-1", "must be from 0"]);
+    refuse(&["render.width_px=300,400"], &["no embedding depends on it"]);
+    refuse(&["embed.w_length=1,2", "embed.w_length=3"], &["is given twice"]);
+    let many = format!("seed={}", (0..200).map(|i| i.to_string()).collect::<Vec<_>>().join(","));
+    refuse(&[&many, &many.replace("seed", "views.seed_of_nothing")], &["40000 combinations", "10000"]);
 }

@@ -63,6 +63,22 @@ pub enum Error {
         /// The folder.
         folder: PathBuf,
     },
+    /// A key that no result of a sweep depends on, or that is given twice.
+    #[error("--over {key}: {reason}", reason = reason.text())]
+    NotSwept {
+        /// The key.
+        key: String,
+        /// Why not.
+        reason: NotSwept,
+    },
+    /// More combinations than a sweep may have.
+    #[error("the sweep has {n_combinations} combinations, allowed are {limit}")]
+    SweepSize {
+        /// How many there are.
+        n_combinations: u64,
+        /// How many there may be.
+        limit: u64,
+    },
     /// A setting that cannot be changed after the fact.
     #[error("--set {key}: {folder} was made with other settings already", folder = folder.display())]
     Settled {
@@ -186,6 +202,27 @@ pub enum Error {
     },
 }
 
+/// Why a key is not swept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NotSwept {
+    /// It only concerns pictures or names.
+    Ineffective,
+    /// It is there already.
+    Twice,
+    /// It has no values.
+    Empty,
+}
+
+impl NotSwept {
+    fn text(self) -> &'static str {
+        match self {
+            Self::Ineffective => "no embedding depends on it",
+            Self::Twice => "is given twice",
+            Self::Empty => "has no values",
+        }
+    }
+}
+
 impl Error {
     pub(crate) fn stage(stage: Stage) -> impl Fn(Box<dyn Diagnose + Send + Sync>) -> Self {
         move |cause| Self::Stage { stage, cause }
@@ -205,6 +242,7 @@ impl Diagnose for Error {
             Self::NoRun { .. } => "E-COMPARE-NO-RUN",
             Self::RunInTheWay { .. } => "E-COMPARE-FOLDER",
             Self::Settled { .. } => "E-COMPARE-SETTINGS",
+            Self::NotSwept { .. } | Self::SweepSize { .. } => "E-SWEEP",
             Self::Altered { .. } => "E-RUN-ALTERED-FILE",
             Self::Certificate { .. } => "E-RUN-CERTIFICATE",
             Self::Unverified { .. } => "E-VERIFY",
@@ -232,6 +270,8 @@ impl Diagnose for Error {
             | Self::OtherInput { .. }
             | Self::RunInTheWay { .. }
             | Self::Settled { .. }
+            | Self::NotSwept { .. }
+            | Self::SweepSize { .. }
             | Self::Threads { .. } => Class::Usage,
             Self::NoRun { .. } | Self::MissingArtifact { .. } | Self::Read { .. } | Self::Write { .. } => {
                 Class::Io
@@ -251,6 +291,8 @@ impl Diagnose for Error {
             Self::Certificate { .. } => "make the embedding again with espalier embed".to_owned(),
             Self::NoRun { .. } => "run it with this version, at least up to --to embed".to_owned(),
             Self::RunInTheWay { .. } => "choose another folder with -o".to_owned(),
+            Self::NotSwept { .. } => "write --over KEY=V1,V2,…, such as --over embed.w_length=0.5,1,2,4".to_owned(),
+            Self::SweepSize { .. } => "give fewer values, or sweep one key at a time".to_owned(),
             Self::Settled { .. } => "of a finished run only render.* can be changed; or compare its config".to_owned(),
             Self::MissingArtifact { .. } => "start from an earlier stage with --from, or name the file".to_owned(),
             Self::Altered { .. } => {

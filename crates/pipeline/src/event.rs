@@ -42,6 +42,15 @@ pub enum Event {
         /// What it did, as a phrase.
         line: String,
     },
+    /// A combination of a sweep is done.
+    Combination {
+        /// Which, from 1.
+        done: usize,
+        /// How many there are.
+        total: usize,
+        /// Its settings, and what they came to, as a phrase.
+        line: String,
+    },
     /// The run stops with an error.
     Stopped {
         /// The stages whose results are in place.

@@ -8,6 +8,7 @@
 //! | what each stage does with them | `steps` |
 //! | the loop over the stages | [`run`](mod@run) |
 //! | methods and runs side by side | [`compare`](mod@compare) |
+//! | a config at many settings | [`sweep`](mod@sweep) |
 //! | the run folder: atomic files, digests, one lock | `folder` |
 //! | how a result came about, what each method cost | `provenance`, `methods` |
 //! | what the columns of the tables mean | `dictionary` |
@@ -33,11 +34,12 @@ pub mod run;
 mod settings;
 pub mod stage;
 mod steps;
+pub mod sweep;
 mod verify;
 
 pub use compare::{CompareRequest, Compared, Subject, compare};
 pub use config::{Config, ConfigError, Loaded, Override};
-pub use error::Error;
+pub use error::{Error, NotSwept};
 pub use espalier_verify::{Check, Outcome};
 pub use event::Event;
 pub use phantom::make_phantom;
@@ -45,4 +47,5 @@ pub use provenance::{edits_of_run, input_of_run};
 pub use run::{Request, Summary, run};
 pub use settings::Difference;
 pub use stage::{Artifact, Stage};
+pub use sweep::{Axis, SweepRequest, Swept, sweep};
 pub use verify::{Verification, verify};

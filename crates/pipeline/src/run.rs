@@ -218,12 +218,17 @@ fn write_outcome(folder: &mut RunFolder, stage: Stage, outcome: &steps::Outcome)
 }
 
 fn resolve_source(request: &Request) -> Result<Source, Error> {
-    let Loaded { config, base_dir } = &request.loaded;
-    config.input.resolve(base_dir, request.data_dir.as_deref()).map_err(|cause| Error::Input { cause })
+    source_of(&request.loaded, request.data_dir.as_deref())
+}
+
+/// Where a run of this config begins.
+pub(crate) fn source_of(loaded: &Loaded, data_dir: Option<&Path>) -> Result<Source, Error> {
+    let Loaded { config, base_dir } = loaded;
+    config.input.resolve(base_dir, data_dir).map_err(|cause| Error::Input { cause })
 }
 
 /// The stages that a run from this source passes through.
-fn stages_of(source: &Source) -> Vec<Stage> {
+pub(crate) fn stages_of(source: &Source) -> Vec<Stage> {
     Stage::ALL
         .into_iter()
         .filter(|stage| match source {

@@ -146,6 +146,19 @@ impl fmt::Display for Stage {
 }
 
 impl Artifact {
+    /// All artifacts in the order in which they arise.
+    pub const ALL: [Self; 9] = [
+        Self::Volume,
+        Self::Traced,
+        Self::Mask,
+        Self::Skeleton,
+        Self::Spheres,
+        Self::Tree,
+        Self::Views,
+        Self::Embedding,
+        Self::Comparison,
+    ];
+
     /// Its file, relative to the run folder.
     #[must_use]
     pub fn file(self) -> &'static str {

@@ -9,7 +9,7 @@
 //! | 5 | `sketch`, `cone`, `kinship` | edges as round cones in pixels |
 //! | 6 | `raster`, `samples`, `shade` | the pixels |
 //! | 7 | `paint`, `svg`, `outline`, `layers` | the files |
-//! | 8 | `side_by_side`, `tiling`, `parts` | several layouts in one figure |
+//! | 8 | `side_by_side`, `tiling`, `parts`; `chart` | several layouts in one figure; charts of numbers |
 //!
 //! **Source** section 4.1 of [Hu2022].
 
@@ -41,6 +41,7 @@ mod outline;
 mod paint;
 mod svg;
 
+mod chart;
 mod parts;
 mod side_by_side;
 mod tiling;
@@ -50,6 +51,7 @@ mod error;
 use espalier_model::{Branches, Embedding, Report, Tree, ViewHierarchy};
 use glam::DVec3;
 
+pub use chart::{Chart, Charts, charts};
 use coloring::Coloring;
 pub use error::Error;
 use furniture::Heading;

@@ -7,7 +7,7 @@
 //! counted again from the layouts as written.
 
 pub(crate) mod figure;
-mod terminal;
+pub(crate) mod terminal;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -182,7 +182,7 @@ fn own_config(request: &CompareRequest, folder: &RunFolder) -> Result<Config, Er
 }
 
 /// What a file says of its layouts is checked before a table repeats it.
-fn check_crossings(tree: &Tree, comparison: &Comparison, path: &Path) -> Result<(), Error> {
+pub(crate) fn check_crossings(tree: &Tree, comparison: &Comparison, path: &Path) -> Result<(), Error> {
     for layout in &comparison.layouts {
         let found = espalier_embed::certify(tree, &layout.positions_mm).crossings;
         if found != layout.row.crossings {
@@ -193,7 +193,7 @@ fn check_crossings(tree: &Tree, comparison: &Comparison, path: &Path) -> Result<
 }
 
 /// The files of a comparison by name, with their bytes.
-type Files = Vec<(String, Vec<u8>)>;
+pub(crate) type Files = Vec<(String, Vec<u8>)>;
 
 fn results(request: &CompareRequest, runs: &[Found]) -> Result<(ComparedRuns, Files), Error> {
     let rows = ComparedRuns(runs.iter().map(rows_of).collect());

@@ -47,7 +47,7 @@ clear: least distance of edges, in median edges   backw: length that points back
 ";
 
 /// The table; `seconds` has the methods of each run with their time.
-pub(super) fn table(runs: &ComparedRuns, seconds: &[&[(String, f64)]]) -> String {
+pub(crate) fn table(runs: &ComparedRuns, seconds: &[&[(String, f64)]]) -> String {
     let has_names = runs.0.len() > 1;
     let mut lines = vec![heads(has_names)];
     for (run, seconds) in runs.0.iter().zip(seconds) {
@@ -62,6 +62,16 @@ pub(super) fn table(runs: &ComparedRuns, seconds: &[&[(String, f64)]]) -> String
         }
     }
     aligned(&lines, if has_names { 2 } else { 1 }) + "\n" + LEGEND
+}
+
+/// The heads of the columns of numbers.
+pub(crate) fn number_heads() -> Vec<String> {
+    COLUMNS.iter().map(|column| column.head.to_owned()).collect()
+}
+
+/// The numbers of a row, without marks.
+pub(crate) fn numbers(row: &MethodRow) -> Vec<String> {
+    COLUMNS.iter().map(|column| (column.text)(row)).collect()
 }
 
 fn heads(has_names: bool) -> Vec<String> {
@@ -98,7 +108,7 @@ fn short(value: f64) -> String {
 }
 
 /// Columns of equal width: the first `n_left` to the left, the others to the right.
-fn aligned(lines: &[Vec<String>], n_left: usize) -> String {
+pub(crate) fn aligned(lines: &[Vec<String>], n_left: usize) -> String {
     let n_columns = lines.iter().map(Vec::len).max().unwrap_or(0);
     let width = |column: usize| {
         lines.iter().filter_map(|cells| cells.get(column)).map(|cell| cell.chars().count()).max().unwrap_or(0)

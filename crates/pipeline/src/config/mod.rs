@@ -11,10 +11,10 @@ use std::path::{Path, PathBuf};
 
 use espalier_model::diagnose::{Class, Diagnose, ParamError};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 pub use input::{Input, InputKind, Source, Unit};
 
+use crate::error::Error;
 use crate::stage::Stage;
 
 /// The version of the config's schema.
@@ -78,8 +78,24 @@ pub struct Loaded {
     pub base_dir: PathBuf,
 }
 
+impl Loaded {
+    /// A config file (.toml), or an input with every setting at its default, under `overrides`.
+    ///
+    /// # Errors
+    /// [`Error`] if the file cannot be read or a setting is wrong.
+    pub fn read(path: &Path, overrides: &[Override]) -> Result<Self, Error> {
+        if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
+            return Ok(Self { config: Config::for_input(path, overrides)?, base_dir: PathBuf::new() });
+        }
+        let text =
+            std::fs::read_to_string(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
+        let base_dir = path.parent().unwrap_or(Path::new("")).to_owned();
+        Ok(Self { config: Config::parse(&text, path, overrides)?, base_dir })
+    }
+}
+
 /// Why a config cannot be used, at which place.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{rendered}")]
 pub struct ConfigError {
     rendered: String,
