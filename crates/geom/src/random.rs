@@ -28,8 +28,6 @@ pub enum Purpose {
     SwarmStep = 5,
     /// The search for the sides of turns.
     MirrorSearch = 6,
-    /// Bends that untangle a layout.
-    Untangling = 8,
     /// Tests.
     Test = 99,
 }

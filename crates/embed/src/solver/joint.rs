@@ -37,6 +37,8 @@ pub(crate) struct Part {
     pub(crate) pivot: DVec2,
     /// The turn, as cosine and sine times the scale.
     pub(crate) turn: DVec2,
+    /// The turn in rad.
+    pub(crate) turn_rad: f64,
 }
 
 impl Part {
@@ -53,6 +55,8 @@ pub(crate) struct Pieces {
     pub(crate) motions: Vec<Similarity>,
     /// Pieces of one group have the same motion.
     groups: Vec<usize>,
+    /// By how much a piece turns in all, in rad.
+    turns_rad: Vec<f64>,
     /// Whether the edges of a piece keep their distances, or widen them.
     is_rigid: Vec<bool>,
     open: Vec<Open>,
@@ -63,6 +67,7 @@ pub(crate) struct Pieces {
 struct Open {
     end: usize,
     motion: Similarity,
+    turn_rad: f64,
     group: usize,
 }
 
@@ -73,14 +78,20 @@ impl Pieces {
         self.starts.clear();
         self.motions.clear();
         self.groups.clear();
+        self.turns_rad.clear();
         self.is_rigid.clear();
         self.open.clear();
-        let mut top = Open { end: n_nodes, motion: Similarity::IDENTITY, group: 0 };
+        let mut top = Open { end: n_nodes, motion: Similarity::IDENTITY, turn_rad: 0.0, group: 0 };
         self.start(0, top);
         for (idx, part) in parts.iter().enumerate() {
             top = self.close_up_to(part.range.start, top);
             self.open.push(top);
-            top = Open { end: part.range.end, motion: top.motion.after(&part.motion()), group: idx + 1 };
+            top = Open {
+                end: part.range.end,
+                motion: top.motion.after(&part.motion()),
+                turn_rad: top.turn_rad + part.turn_rad,
+                group: idx + 1,
+            };
             self.start(part.range.start, top);
         }
         self.close_up_to(n_nodes - 1, top);
@@ -112,17 +123,29 @@ impl Pieces {
     }
 
     /// Starts a piece; one that starts at the same node has no nodes and goes.
-    fn start(&mut self, node: usize, Open { motion, group, .. }: Open) {
+    fn start(&mut self, node: usize, Open { motion, turn_rad, group, .. }: Open) {
         if self.starts.last() == Some(&node) {
             self.starts.pop();
             self.motions.pop();
             self.groups.pop();
+            self.turns_rad.pop();
             self.is_rigid.pop();
         }
         self.starts.push(node);
         self.motions.push(motion);
         self.groups.push(group);
+        self.turns_rad.push(turn_rad);
         self.is_rigid.push(motion.scale() > 1.0 - 1e-12);
+    }
+
+    /// The ranges of a preorder of `n_nodes` that turn, and by how much, in rad.
+    pub(crate) fn turns(&self, n_nodes: usize) -> impl Iterator<Item = (Range<usize>, f64)> + '_ {
+        let ends = self.starts.iter().skip(1).copied().chain(std::iter::once(n_nodes));
+        let ranges = self.starts.iter().zip(ends).map(|(&start, end)| start..end);
+        ranges
+            .zip(&self.turns_rad)
+            .map(|(range, &turn_rad)| (range, turn_rad))
+            .filter(|(_, turn)| *turn != 0.0)
     }
 
     /// The piece of a node.

@@ -16,6 +16,7 @@ use glam::DVec2;
 
 use super::hierarchy::Hierarchy;
 use super::joint::{Change, Part, Pieces};
+use super::placement::Placement;
 use super::shape::Shape;
 use super::work::Work;
 use crate::problem::Problem;
@@ -40,22 +41,43 @@ pub(crate) struct Linkage<'a> {
     separation: &'a Separation,
     pub(crate) shape: Shape,
     hierarchy: Hierarchy,
+    /// The placement term, if it counts.
+    pub(crate) placement: Option<Placement>,
     /// What a unit of r_l² costs for each segment.
     length_cost: Vec<f64>,
+    /// The change that is looked at, and what it moves.
+    pub(crate) change: Change,
     parts: Vec<Part>,
     pieces: Pieces,
     n_changes: u32,
 }
 
 impl<'a> Linkage<'a> {
+    /// The linkage of a shape; the placement term does not count.
     pub(crate) fn new(problem: &'a Problem<'a>, separation: &'a Separation, shape: Shape) -> Self {
         let hierarchy = Hierarchy::new(&problem.parent, &shape.positions(problem));
         let mut length_cost = vec![0.0; shape.length_ratio.len()];
         for node in 1..problem.n_nodes() {
             length_cost[problem.branch[node] as usize] += problem.length_cost[node];
         }
-        let (parts, pieces) = (Vec::new(), Pieces::default());
-        Self { problem, separation, shape, hierarchy, length_cost, parts, pieces, n_changes: 0 }
+        Self {
+            problem,
+            separation,
+            shape,
+            hierarchy,
+            placement: None,
+            length_cost,
+            change: Change::default(),
+            parts: Vec::new(),
+            pieces: Pieces::default(),
+            n_changes: 0,
+        }
+    }
+
+    /// The same with the placement term.
+    pub(crate) fn with_placement(mut self) -> Self {
+        self.placement = Some(Placement::of(self.problem, &self.shape.headings(self.problem)));
+        self
     }
 
     /// The node where the paths to two edges part.
@@ -75,26 +97,36 @@ impl<'a> Linkage<'a> {
         self.problem.angle_cost[node] * ratio * ratio
     }
 
-    /// By how much a change lowers the loss.
-    pub(crate) fn gain(&self, change: &Change) -> f64 {
-        let angles = change
-            .angles
-            .iter()
-            .map(|&(node, ratio)| self.angle_loss(node) - self.problem.angle_cost[node] * ratio * ratio);
-        let lengths = change
-            .lengths
-            .iter()
-            .map(|&(segment, ratio)| self.length_loss(segment) - self.length_cost[segment] * ratio * ratio);
-        angles.sum::<f64>() + lengths.sum::<f64>()
+    /// By how much the change lowers the loss (without the placement term).
+    pub(crate) fn loss_gain(&self) -> f64 {
+        let angle = |&(node, ratio): &(usize, f64)| {
+            self.angle_loss(node) - self.problem.angle_cost[node] * ratio * ratio
+        };
+        let length = |&(segment, ratio): &(usize, f64)| {
+            self.length_loss(segment) - self.length_cost[segment] * ratio * ratio
+        };
+        let angles: f64 = self.change.angles.iter().map(angle).sum();
+        angles + self.change.lengths.iter().map(length).sum::<f64>()
     }
 
-    /// Whether a change is clear; if not, a pair of edges in its way.
-    pub(crate) fn try_change(&mut self, change: &Change, work: &mut Work) -> Result<(), (usize, usize)> {
-        self.cut(change);
+    /// By how much the change, which is cut, lowers the placement term.
+    fn placement_gain(&self) -> f64 {
+        let Some(placement) = &self.placement else { return 0.0 };
+        let turns = self.pieces.turns(self.problem.n_nodes());
+        turns.map(|(range, turn_rad)| placement.gain(&range, turn_rad)).sum()
+    }
+
+    /// By how much the change, which is cut, lowers what counts.
+    pub(crate) fn gain(&self) -> f64 {
+        self.loss_gain() + self.placement_gain()
+    }
+
+    /// Whether the change, which is cut, is clear within a range of edges; if not, a pair of edges in its way.
+    pub(crate) fn is_clear(&mut self, window: &Range<usize>, work: &mut Work) -> Result<(), (usize, usize)> {
         let Self { problem, separation, hierarchy, pieces, .. } = self;
         let (before, mut in_the_way) = (hierarchy.n_looked, (0, 0));
         let margin_mm = separation.clearance_mm.max(separation.tolerance_mm());
-        let is_clear = hierarchy.each_near(pieces, &(0..problem.n_nodes()), margin_mm, |pair| {
+        let is_clear = hierarchy.each_near(pieces, window, margin_mm, |pair| {
             in_the_way = pair.edges;
             separation.may_move(problem, pair.edges, &pair.before, &pair.after)
         });
@@ -102,15 +134,14 @@ impl<'a> Linkage<'a> {
         if is_clear { Ok(()) } else { Err(in_the_way) }
     }
 
-    /// The pairs of edges within a range that are in the way of a change, up to one more than a limit.
+    /// The pairs of edges within a range that are in the way of the change, which is cut, up to one more than a limit.
     pub(crate) fn obstacles(
         &mut self,
-        (change, rule): (&Change, Rule),
+        rule: Rule,
         (window, limit): (&Range<usize>, usize),
         found: &mut Vec<(u32, u32)>,
         work: &mut Work,
     ) {
-        self.cut(change);
         let Self { problem, separation, hierarchy, pieces, .. } = self;
         let before = hierarchy.n_looked;
         let margin_mm = separation.clearance_mm.max(separation.tolerance_mm());
@@ -149,14 +180,13 @@ impl<'a> Linkage<'a> {
         found
     }
 
-    /// Whether a change moves two edges against each other; to be asked right after it was tried.
+    /// Whether the change, which is cut, moves two edges against each other.
     pub(crate) fn parts_pair(&self, a: usize, b: usize) -> bool {
         !self.pieces.move_together(self.pieces.of(a), self.pieces.of(b))
     }
 
-    /// Whether one pair of edges allows a change.
-    pub(crate) fn allows(&mut self, (a, b): (usize, usize), change: &Change) -> bool {
-        self.cut(change);
+    /// Whether one pair of edges allows the change, which is cut.
+    pub(crate) fn allows(&mut self, (a, b): (usize, usize)) -> bool {
         let (piece_a, piece_b) = (self.pieces.of(a), self.pieces.of(b));
         if self.pieces.move_together(piece_a, piece_b) {
             return true;
@@ -170,18 +200,23 @@ impl<'a> Linkage<'a> {
         super::hierarchy::moved(edge, &self.pieces.motions[piece])
     }
 
-    /// Makes a change.
-    pub(crate) fn make(&mut self, change: &Change) {
-        self.cut(change);
-        // Inner parts first: an outer one would move the pivots of its inner ones.
-        for idx in (0..self.parts.len()).rev() {
-            let motion = self.parts[idx].motion();
-            self.hierarchy.move_range(&self.parts[idx].range, &motion);
+    /// Makes the change, which is cut.
+    pub(crate) fn make(&mut self) {
+        if let Some(placement) = &mut self.placement {
+            let turns = self.pieces.turns(self.problem.n_nodes());
+            placement.total -= turns.map(|(range, turn_rad)| placement.gain(&range, turn_rad)).sum::<f64>();
         }
-        for &(node, ratio) in &change.angles {
+        // Inner parts first: an outer one would move the pivots of its inner ones.
+        for part in self.parts.iter().rev() {
+            self.hierarchy.move_range(&part.range, &part.motion());
+            if let Some(placement) = &mut self.placement {
+                placement.turn(&part.range, part.turn_rad);
+            }
+        }
+        for &(node, ratio) in &self.change.angles {
             self.shape.angle_ratio[node] = ratio;
         }
-        for &(segment, ratio) in &change.lengths {
+        for &(segment, ratio) in &self.change.lengths {
             self.shape.length_ratio[segment] = ratio;
         }
         self.n_changes += 1;
@@ -206,12 +241,15 @@ impl<'a> Linkage<'a> {
     pub(crate) fn refresh(&mut self) {
         self.n_changes = 0;
         self.hierarchy.place(&self.problem.parent, &self.shape.positions(self.problem));
+        if let Some(placement) = &mut self.placement {
+            placement.look(self.problem, &self.shape.headings(self.problem));
+        }
     }
 
-    /// The parts and pieces of a change.
-    fn cut(&mut self, change: &Change) {
+    /// Finds what the change moves.
+    pub(crate) fn cut(&mut self) {
         self.parts.clear();
-        for &(node, ratio) in &change.angles {
+        for &(node, ratio) in &self.change.angles {
             let (bend, old) = (self.problem.bend[node], self.shape.angle_ratio[node]);
             let turn_rad = self.problem.side[node]
                 * (ratio::embedded_bend(bend, ratio) - ratio::embedded_bend(bend, old));
@@ -220,11 +258,13 @@ impl<'a> Linkage<'a> {
                     range: self.problem.tree.subtree(node),
                     pivot: self.hierarchy.edge(node).a,
                     turn: math::unit_vector(turn_rad),
+                    turn_rad,
                 };
                 self.parts.push(part);
             }
         }
-        for &(segment, ratio) in &change.lengths {
+        for idx in 0..self.change.lengths.len() {
+            let (segment, ratio) = self.change.lengths[idx];
             let scale = (1.0 + ratio) / (1.0 + self.shape.length_ratio[segment]);
             if scale != 1.0 {
                 self.scale_segment(segment, scale);
@@ -239,10 +279,10 @@ impl<'a> Linkage<'a> {
         let range = self.problem.tree.subtree(first);
         let below = nodes.end..range.end;
         let pivot = self.hierarchy.edge(first).a;
-        self.parts.push(Part { range, pivot, turn: DVec2::new(scale, 0.0) });
+        self.parts.push(Part { range, pivot, turn: DVec2::new(scale, 0.0), turn_rad: 0.0 });
         if !below.is_empty() {
             let pivot = self.hierarchy.edge(end).b;
-            self.parts.push(Part { range: below, pivot, turn: DVec2::new(1.0 / scale, 0.0) });
+            self.parts.push(Part { range: below, pivot, turn: DVec2::new(1.0 / scale, 0.0), turn_rad: 0.0 });
         }
     }
 }

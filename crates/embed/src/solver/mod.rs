@@ -8,6 +8,7 @@
 //! | 4 | `barrier/` | all ratios at once, under a barrier that keeps branches apart |
 //! | | `shape`, `work` | a layout by its ratios; the budget |
 //! | | `linkage`, `joint`, `deviation` | a layout as a linkage: what a change of some ratios moves, gains and hits |
+//! | | `placement` | the placement term while subtrees turn |
 //! | | `hierarchy`, `similarity`, `grid` | who may be near whom: boxes over subtrees that move as a whole, cells |
 //! | | `repair` | manual edits: a layout of which a part is pinned, freed of crossings |
 //!
@@ -30,6 +31,7 @@ mod hierarchy;
 mod joint;
 mod linkage;
 pub(crate) mod mirrors;
+mod placement;
 mod repair;
 mod shape;
 mod similarity;
@@ -126,7 +128,6 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Descent knows nothing of placement, so what it gains may be lost there.
     fn keep_if_better(&mut self, step: impl FnOnce(&mut Self)) {
         let (kept, before) = (self.shape.clone(), self.energy());
         step(self);

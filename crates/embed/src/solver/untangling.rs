@@ -7,10 +7,10 @@
 //! its subtree count. While a pair crosses:
 //! 1. *Bend*: a run of nodes on a leg turns by an angle that they share; many runs and angles, the cheapest first,
 //!    until one leaves fewer crossings.
-//! 2. *Search* where none does: bends by chance, by the rule of Metropolis, through layouts with more crossings too.
-//! 3. *Blend* where that fails: ratios on the legs go a part of the way to those of the cone; then those of the
+//! 2. *Blend* where none does: ratios on the legs go a part of the way to those of the cone; then those of the
 //!    smaller child's subtree, of the fork's, at last of all below the segment. Of the shares tried the least that
-//!    leaves fewer crossings is made.
+//!    leaves fewer crossings is made. Then a descent in what is below the segment takes back what it can: a
+//!    subtree that has opened like a fan folds to where there is room, better than one that shrank.
 //!
 //! A budget that is spent gives the cone.
 //! **Guarantees** no crossing where nothing is pinned: a subtree whose ratios are the cone's has none, and the last
@@ -19,11 +19,8 @@
 
 use std::ops::Range;
 
-use espalier_geom::math;
-use espalier_geom::random::{Purpose, Stream};
-
+use super::descent::descend_within;
 use super::deviation::{deviation, ratio_of, softness};
-use super::joint::Change;
 use super::linkage::{Linkage, Rule};
 use super::shape::Shape;
 use super::work::Work;
@@ -38,16 +35,10 @@ const MAX_PLACES: usize = 12;
 const TURNS_RAD: [f64; 9] = [0.01, 0.025, 0.06, 0.13, 0.25, 0.5, 1.0, 1.8, 3.0];
 /// Crossing pairs of which bends are tried before a blend is made.
 const MAX_PAIRS: usize = 8;
+/// How many pairs that were in the way are asked first.
+const MEMORY: usize = 16;
 /// Shares of the way to the cone, in this order.
 const BLENDS: [f64; 5] = [0.05, 0.12, 0.3, 0.6, 1.0];
-
-/// The budget of a search, in looks for each edge that counts.
-const SEARCH_WORK: u64 = 20_000;
-/// Temperatures of a search, in loss.
-const T_START: f64 = 0.3;
-const T_END: f64 = 0.01;
-/// What a crossing costs in a search, in loss.
-const CROSSING_LOSS: f64 = 0.5;
 
 /// A shape without crossings near the targets; `cone` is the shape to fall back on.
 pub(crate) fn untangle(problem: &Problem, separation: &Separation, cone: &Shape, work: &mut Work) -> Shape {
@@ -56,12 +47,10 @@ pub(crate) fn untangle(problem: &Problem, separation: &Separation, cone: &Shape,
         problem,
         cone,
         linkage,
-        change: Change::default(),
         obstacles: Vec::new(),
         crossings: Vec::new(),
         window: 0..0,
-        seed: 0,
-        n_searches: 0,
+        recent: Vec::new(),
     };
     for segment in (0..problem.branches.list().len()).rev() {
         untangling.untangle_segment(segment, work);
@@ -78,14 +67,13 @@ struct Untangling<'a> {
     problem: &'a Problem<'a>,
     cone: &'a Shape,
     linkage: Linkage<'a>,
-    change: Change,
     obstacles: Vec<(u32, u32)>,
     /// The pairs that cross, of the edges that count.
     crossings: Vec<(u32, u32)>,
     /// The edges that count.
     window: Range<usize>,
-    seed: u64,
-    n_searches: u32,
+    /// Pairs that were in the way lately.
+    recent: Vec<(u32, u32)>,
 }
 
 impl Untangling<'_> {
@@ -106,11 +94,19 @@ impl Untangling<'_> {
     }
 
     fn resolve(&mut self, work: &mut Work) {
+        self.recent.clear();
+        let mut has_blended = false;
         while !self.crossings.is_empty() {
-            let has_bent = !work.is_spent() && self.bend(work);
-            if !has_bent && !self.anneal(work) && !self.blend(work) {
-                break;
+            if !work.is_spent() && self.bend(work) {
+                continue;
             }
+            if !self.blend(work) {
+                return;
+            }
+            has_blended = true;
+        }
+        if has_blended {
+            descend_within(self.problem, &mut self.linkage, &self.window, work);
         }
     }
 
@@ -128,7 +124,7 @@ impl Untangling<'_> {
                         let run = &leg[start..start + n_nodes];
                         for turn in TURNS_RAD.into_iter().flat_map(|turn| [turn, -turn]) {
                             if self.set_bend(run, turn) {
-                                let loss = -self.linkage.gain(&self.change);
+                                let loss = -self.linkage.loss_gain();
                                 bends.push((loss, leg_idx, start..start + n_nodes, turn));
                             }
                         }
@@ -146,60 +142,6 @@ impl Untangling<'_> {
         false
     }
 
-    /// Searches for bends that leave no crossing, by chance and through worse layouts; whether they were found.
-    fn anneal(&mut self, work: &mut Work) -> bool {
-        let (shape, crossings) = (self.linkage.shape.clone(), self.crossings.clone());
-        self.n_searches += 1;
-        let mut stream = Stream::new(self.seed, Purpose::Untangling, self.n_searches, 0);
-        let limit = work.done + SEARCH_WORK * (self.window.len() as u64).max(200);
-        let start = work.done;
-        while !self.crossings.is_empty() && work.done < limit && !work.is_spent() {
-            let progress = (work.done - start) as f64 / (limit - start) as f64;
-            let temperature = T_START * math::pow(T_END / T_START, progress);
-            self.anneal_once(temperature, &mut stream, work);
-            work.spend(20);
-        }
-        if self.crossings.is_empty() {
-            return true;
-        }
-        self.linkage.set_shape(shape);
-        self.crossings = crossings;
-        false
-    }
-
-    fn anneal_once(&mut self, temperature: f64, stream: &mut Stream, work: &mut Work) {
-        let (a, b) = self.crossings[stream.below(self.crossings.len() as u32) as usize];
-        let legs = self.legs(a as usize, b as usize);
-        let leg = &legs[stream.below(2) as usize];
-        if leg.is_empty() {
-            return;
-        }
-        let n_nodes = math::pow(leg.len() as f64, stream.unit()) as usize;
-        let start = stream.below((leg.len() - n_nodes + 1) as u32) as usize;
-        let run = &leg[start..start + n_nodes];
-        let is_set = if stream.below(4) == 0 {
-            let share = stream.unit();
-            self.change.clear();
-            let ratios = run.iter().map(|&node| (node, share * self.linkage.shape.angle_ratio[node]));
-            self.change.angles.extend(ratios.filter(|&(_, ratio)| ratio != 0.0));
-            true
-        } else {
-            let size = math::pow(300.0, stream.unit()) * 0.01;
-            let turn = if stream.below(2) == 0 { size } else { -size };
-            self.set_bend(run, turn)
-        };
-        if !is_set {
-            return;
-        }
-        // The threshold first: a layout with more crossings than it allows is not counted to the end.
-        let loss = -self.linkage.gain(&self.change);
-        let allowed = (-temperature * math::ln(1.0 - stream.unit()) - loss) / CROSSING_LOSS;
-        let most = self.crossings.len() as f64 + allowed;
-        if most >= 0.0 {
-            self.make_if_at_most(Rule::Clearance, most as usize, work);
-        }
-    }
-
     /// The nodes that turn one edge of a pair against the other, from each edge upwards.
     fn legs(&self, a: usize, b: usize) -> [Vec<usize>; 2] {
         let parting = self.linkage.parting(a, b);
@@ -212,7 +154,7 @@ impl Untangling<'_> {
 
     /// The change by which nodes turn by an angle in all, each by its part; whether it is in range.
     fn set_bend(&mut self, run: &[usize], turn_rad: f64) -> bool {
-        self.change.clear();
+        self.linkage.change.clear();
         let problem = self.problem;
         if run.iter().any(|&node| !problem.free_angle[node]) {
             return false;
@@ -222,7 +164,7 @@ impl Untangling<'_> {
             let old = deviation(problem, node, self.linkage.shape.angle_ratio[node]);
             let new = old + turn_rad * (softness(problem, node, turn_rad) / all);
             let Some(ratio) = ratio_of(problem, node, new) else { return false };
-            self.change.angles.push((node, ratio));
+            self.linkage.change.angles.push((node, ratio));
         }
         true
     }
@@ -255,36 +197,59 @@ impl Untangling<'_> {
     }
 
     fn set_blend(&mut self, nodes: &[usize], share: f64) {
-        self.change.clear();
+        self.linkage.change.clear();
         for &node in nodes {
             let (old, cone) = (self.linkage.shape.angle_ratio[node], self.cone.angle_ratio[node]);
             // The cone's own bits at the end of the way, so that the last blend is the cone.
             let ratio = if share < 1.0 { old + share * (cone - old) } else { cone };
             if ratio != old && self.problem.free_angle[node] {
-                self.change.angles.push((node, ratio));
+                self.linkage.change.angles.push((node, ratio));
             }
         }
     }
 
     /// Makes the change if it leaves fewer crossings.
     fn make_if_fewer(&mut self, rule: Rule, work: &mut Work) -> bool {
-        self.make_if_at_most(rule, self.crossings.len() - 1, work)
-    }
-
-    /// Makes the change if it leaves no more crossings than said.
-    fn make_if_at_most(&mut self, rule: Rule, most: usize, work: &mut Work) -> bool {
-        let limit = (&self.window, most);
-        self.linkage.obstacles((&self.change, rule), limit, &mut self.obstacles, work);
-        let linkage = &self.linkage;
-        let n_kept =
-            self.crossings.iter().filter(|&&(a, b)| !linkage.parts_pair(a as usize, b as usize)).count();
-        if n_kept + self.obstacles.len() > most {
+        self.linkage.cut();
+        work.spend(self.linkage.change.angles.len());
+        let is_kept = |&(a, b): &(u32, u32)| !self.linkage.parts_pair(a as usize, b as usize);
+        let n_kept = self.crossings.iter().filter(|&pair| is_kept(pair)).count();
+        let Some(most) = (self.crossings.len() - 1).checked_sub(n_kept) else { return false };
+        if rule == Rule::Clearance && self.recent_in_the_way(most) > most {
             return false;
         }
+        self.linkage.obstacles(rule, (&self.window, most), &mut self.obstacles, work);
+        if self.obstacles.len() > most {
+            self.remember();
+            return false;
+        }
+        let linkage = &self.linkage;
         self.crossings.retain(|&(a, b)| !linkage.parts_pair(a as usize, b as usize));
         self.crossings.append(&mut self.obstacles);
         self.crossings.sort_unstable();
-        self.linkage.make(&self.change);
+        self.linkage.make();
         true
+    }
+
+    /// How many of the pairs that were in the way lately are so again, up to one more than a limit.
+    fn recent_in_the_way(&mut self, limit: usize) -> usize {
+        let mut n_found = 0;
+        for &(a, b) in &self.recent {
+            n_found += usize::from(!self.linkage.allows((a as usize, b as usize)));
+            if n_found > limit {
+                break;
+            }
+        }
+        n_found
+    }
+
+    fn remember(&mut self) {
+        for &pair in &self.obstacles {
+            if !self.recent.contains(&pair) {
+                self.recent.push(pair);
+            }
+        }
+        let n_too_many = self.recent.len().saturating_sub(MEMORY);
+        self.recent.drain(..n_too_many);
     }
 }
