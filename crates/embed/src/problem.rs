@@ -55,6 +55,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) placement_sin: Vec<f64>,
     /// w_X.
     pub(crate) crossing_weight: f64,
+    /// w_s.
+    pub(crate) w_side: f64,
     /// The typical edge length, in mm: the scale of the swarm's tolerance.
     pub(crate) scale_mm: f64,
 }
@@ -123,6 +125,7 @@ impl<'a> Problem<'a> {
             placement_cos,
             placement_sin,
             crossing_weight,
+            w_side: params.w_side,
             scale_mm,
         }
     }

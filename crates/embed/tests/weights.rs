@@ -5,7 +5,7 @@
 mod common;
 
 use common::{random_tree, tree_of, views_along};
-use espalier_embed::{Method, Params, PsoParams, WeightRule, embed};
+use espalier_embed::{Method, Params, PsoParams, SolverParams, WeightRule, embed};
 use espalier_model::diagnose::{Class, Diagnose};
 use espalier_model::{Embedding, Tree};
 use glam::DVec3;
@@ -97,20 +97,28 @@ fn shallow_and_deep(tree: &Tree, ratios: &[f64]) -> (f64, f64) {
 
 #[test]
 fn weights_near_the_root_keep_what_is_near_the_root() {
-    let (mut plain, mut heavy) = ((0.0, 0.0), (0.0, 0.0));
-    for key in 0..12 {
+    let solver = SolverParams { mirrors: false, effort: 0.2, ..SolverParams::default() };
+    let plain = Params { method: Method::Solver, methods: Vec::new(), solver, ..Params::default() };
+    let near_root = WeightRule { generations: Some([0, 2]), ..rule() };
+    let lengths = WeightRule { w_length: Some(400.0), ..near_root.clone() };
+    let angles = WeightRule { w_angle: Some(400.0), ..near_root };
+    let mut sums = [(0.0, 0.0); 4];
+    for key in 0..6 {
         // Bushy trees in space, which no layout can draw without losses.
         let tree = random_tree(1, 63, 0.5, false, 100 + key);
-        let stiff = WeightRule { generations: Some([0, 2]), w_angle: Some(200.0), ..rule() };
-        let pso = PsoParams { particles: 64, iterations: 40, ..PsoParams::default() };
-        for (sum, rules) in [(&mut plain, vec![]), (&mut heavy, vec![stiff])] {
-            let params = Params { pso: pso.clone(), ..with(&rules) };
-            let (shallow, deep) = shallow_and_deep(&tree, &laid_flat(&tree, &params).angle_ratio);
+        let [plain, stiff, true_angles] = [vec![], vec![lengths.clone()], vec![angles.clone()]]
+            .map(|weights| laid_flat(&tree, &Params { weights, ..plain.clone() }));
+        let ratios = [&plain.length_ratio, &stiff.length_ratio, &plain.angle_ratio, &true_angles.angle_ratio];
+        for (sum, ratios) in sums.iter_mut().zip(ratios) {
+            let (shallow, deep) = shallow_and_deep(&tree, ratios);
             *sum = (sum.0 + shallow, sum.1 + deep);
         }
     }
-    assert!(heavy.0 < plain.0, "near the root {plain:?} {heavy:?}");
-    assert!(heavy.1 > plain.1, "at the cost of others {plain:?} {heavy:?}");
+    let [stretched, stiff, bent, true_angles] = sums;
+    assert!(stiff.0 < 0.1 * stretched.0, "lengths near the root: {stretched:?} {stiff:?}");
+    assert!(stiff.1 > stretched.1, "at the cost of others: {stretched:?} {stiff:?}");
+    assert!(true_angles.0 < 0.75 * bent.0, "angles near the root: {bent:?} {true_angles:?}");
+    assert!(true_angles.1 > bent.1, "at the cost of others: {bent:?} {true_angles:?}");
 }
 
 #[test]

@@ -53,8 +53,9 @@ pub struct Params {
     pub w_placement: f64,
     /// Weight w_s of the side of a turn, ≥ 0: what it costs that a bend goes to the other side of its target,
     /// beside its angle ratio: per branch, w_s times the mean of 2/π · min(a, π − a, b, π − b) over such bends, a of
-    /// the target, b as drawn. Default 0, the paper's: a mirror image is as true as what it mirrors. Larger keeps
-    /// arcs arcs and zigzags zigzags, at the cost of other losses.
+    /// the target, b as drawn. The search for sides (`solver.mirrors`), where a crossing costs 1, adds it to the
+    /// price of a radian that changes sides inside a branch against the local view. Default 0, the paper's: a mirror
+    /// image is as true as what it mirrors. Larger keeps arcs arcs, at the cost of other losses.
     pub w_side: f64,
     /// Price of one crossing: `"auto"` or a number > 0. Default `"auto"`, section 3.2.2 of the paper: 1.5 times
     /// the largest possible loss, so that one crossing costs more than any layout without. The 0.2 of section 5

@@ -146,6 +146,22 @@ fn a_phantom_with_crossings_ends_at_zero_certified() {
 }
 
 #[test]
+fn a_side_weight_leaves_fewer_zigzags() {
+    let tree = grow_tree(Kind::Neuron, &espalier_phantom::Params::default(), 2).expect("a phantom");
+    let mut problem = phantom_problem(&tree);
+    let free = searched(&problem, 0).0;
+    problem.w_side = 20.0;
+    let priced = searched(&problem, 0).0;
+    assert!(priced.terms.crossings <= priced.terms_at_start.crossings);
+    assert!(
+        priced.terms.zigzags_rad < 0.5 * free.terms.zigzags_rad,
+        "{} {}",
+        priced.terms.zigzags_rad,
+        free.terms.zigzags_rad
+    );
+}
+
+#[test]
 fn never_more_crossings_and_nothing_changes_without() {
     let mut n_better = 0;
     for key in 0..48 {

@@ -143,8 +143,7 @@ pub(crate) fn search(problem: &Problem, params: &SolverParams, seed: u64) -> Mir
         };
     }
 
-    let n_segments = problem.branches.list().len();
-    let judge = Prices { placement: 2.0 * prices(n_segments, 1.0).placement, ..prices(n_segments, 1.0) };
+    let judge = Prices { placement: 2.0 * prices(problem, 1.0).placement, ..prices(problem, 1.0) };
     let mut walkers = vec![Walker::new(state, judge); N_WALKS];
     let n_evaluations = params.effort * EVALUATIONS * math::pow(problem.n_nodes() as f64, EVALUATIONS_POWER);
     let mut share_left = 1.0;
@@ -152,7 +151,7 @@ pub(crate) fn search(problem: &Problem, params: &SolverParams, seed: u64) -> Mir
         let phase = Phase {
             hottest: if round == 0 { HOTTEST } else { HOTTEST_AGAIN },
             coldest: COLDEST,
-            prices: prices(n_segments, share),
+            prices: prices(problem, share),
             n_evaluations: n_evaluations * ROUND_SHARE,
         };
         run_side_by_side(&mut walkers, &phase, (seed, round));
@@ -187,14 +186,14 @@ fn has_trunk(problem: &Problem) -> bool {
     }
 }
 
-/// The full prices, those of everything but faults times `share`.
-fn prices(n_segments: usize, share: f64) -> Prices {
+/// The full prices, those of everything but faults times `share`; what the user adds to that of a zigzag stays.
+fn prices(problem: &Problem, share: f64) -> Prices {
     Prices {
         near: NEAR_PRICE,
         kept_out: KEEP_OUT_PRICE,
-        placement: share * PLACEMENT_PRICE * n_segments as f64,
+        placement: share * PLACEMENT_PRICE * problem.branches.list().len() as f64,
         siblings: share * SIBLINGS_PRICE,
-        zigzags: share * ZIGZAG_PRICE,
+        zigzags: share * ZIGZAG_PRICE + problem.w_side,
     }
 }
 
