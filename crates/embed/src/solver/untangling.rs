@@ -7,10 +7,10 @@
 //! its subtree count. While a pair crosses:
 //! 1. *Bend*: a run of nodes on a leg turns by an angle that they share; many runs and angles, the cheapest first,
 //!    until one leaves fewer crossings.
-//! 2. *Blend* where none does: ratios on the legs go a part of the way to those of the cone; then those of the
-//!    smaller child's subtree, of the fork's, at last of all below the segment. Of the shares tried the least that
-//!    leaves fewer crossings is made. Then a descent in what is below the segment takes back what it can: a
-//!    subtree that has opened like a fan folds to where there is room, better than one that shrank.
+//! 2. Where none does, two ways out, each followed by a descent in what is below the segment; the better one stays.
+//!    - *Retreat*: a subtree of a leg shrinks, or becomes a narrow fan; the cheapest way that leaves fewer crossings.
+//!    - *Blend*: ratios on the legs go a part of the way to those of the cone; then those of the smaller child's
+//!      subtree, of the fork's, at last of all below the segment.
 //!
 //! A budget that is spent gives the cone.
 //! **Guarantees** no crossing where nothing is pinned: a subtree whose ratios are the cone's has none, and the last
@@ -25,6 +25,7 @@ use super::linkage::{Linkage, Rule};
 use super::shape::Shape;
 use super::work::Work;
 use crate::problem::Problem;
+use crate::ratio;
 use crate::separation::Separation;
 
 /// How many nodes share a turn.
@@ -37,8 +38,39 @@ const TURNS_RAD: [f64; 9] = [0.01, 0.025, 0.06, 0.13, 0.25, 0.5, 1.0, 1.8, 3.0];
 const MAX_PAIRS: usize = 8;
 /// How many pairs that were in the way are asked first.
 const MEMORY: usize = 16;
+/// The budget of the bends at a fork, for each edge below it, and of each way out with its descent.
+const WORK_PER_EDGE: u64 = 5000;
+/// Forks with few edges may take as much as if they had so many more.
+const FEW_EDGES: u64 = 100;
 /// Shares of the way to the cone, in this order.
 const BLENDS: [f64; 5] = [0.05, 0.12, 0.3, 0.6, 1.0];
+
+/// How a subtree gets out of the way.
+#[derive(Clone, Copy, Debug)]
+enum Retreat {
+    /// All its lengths by a factor.
+    Shrink(f64),
+    /// The cone's turns below its first edge, narrowed, and that edge turned.
+    Fan { width: f64, turn_rad: f64 },
+}
+
+/// What is tried.
+const RETREATS: [Retreat; 14] = [
+    Retreat::Shrink(0.7),
+    Retreat::Shrink(0.5),
+    Retreat::Shrink(0.25),
+    Retreat::Shrink(0.1),
+    Retreat::Fan { width: 1.0, turn_rad: 0.0 },
+    Retreat::Fan { width: 1.0, turn_rad: 0.6 },
+    Retreat::Fan { width: 1.0, turn_rad: -0.6 },
+    Retreat::Fan { width: 0.2, turn_rad: 0.0 },
+    Retreat::Fan { width: 0.2, turn_rad: 0.3 },
+    Retreat::Fan { width: 0.2, turn_rad: -0.3 },
+    Retreat::Fan { width: 0.2, turn_rad: 0.8 },
+    Retreat::Fan { width: 0.2, turn_rad: -0.8 },
+    Retreat::Fan { width: 0.2, turn_rad: 1.6 },
+    Retreat::Fan { width: 0.2, turn_rad: -1.6 },
+];
 
 /// A shape without crossings near the targets; `cone` is the shape to fall back on.
 pub(crate) fn untangle(problem: &Problem, separation: &Separation, cone: &Shape, work: &mut Work) -> Shape {
@@ -95,19 +127,43 @@ impl Untangling<'_> {
 
     fn resolve(&mut self, work: &mut Work) {
         self.recent.clear();
-        let mut has_blended = false;
-        while !self.crossings.is_empty() {
-            if !work.is_spent() && self.bend(work) {
-                continue;
-            }
-            if !self.blend(work) {
-                return;
-            }
-            has_blended = true;
+        let mut bends = self.part_of(work);
+        while !self.crossings.is_empty() && !bends.is_spent() && self.bend(&mut bends) {}
+        work.add(bends);
+        if self.crossings.is_empty() {
+            return;
         }
-        if has_blended {
-            descend_within(self.problem, &mut self.linkage, &self.window, work);
+
+        // Both ways out, and what a descent makes of them: which is better is not known before.
+        let stuck = (self.linkage.shape.clone(), self.crossings.clone());
+        let retreated = self.leave(&Self::retreat, work).then(|| self.linkage.shape.clone());
+        self.linkage.set_shape(stuck.0);
+        self.crossings = stuck.1;
+        let has_blended = self.leave(&Self::blend, work);
+        if let Some(retreated) = retreated {
+            let loss = |shape: &Shape| shape.loss(self.problem);
+            if !has_blended || loss(&retreated) < loss(&self.linkage.shape) {
+                self.linkage.set_shape(retreated);
+                self.crossings.clear();
+            }
         }
+    }
+
+    /// Goes one way until nothing crosses, and descends from there; whether nothing crosses.
+    fn leave(&mut self, step: &dyn Fn(&mut Self, &mut Work) -> bool, work: &mut Work) -> bool {
+        let mut part = self.part_of(work);
+        while !self.crossings.is_empty() && step(self, &mut part) {}
+        if self.crossings.is_empty() {
+            descend_within(self.problem, &mut self.linkage, &self.window, &mut part);
+        }
+        work.add(part);
+        self.crossings.is_empty()
+    }
+
+    /// What the edges that count may take of the budget at once.
+    fn part_of(&self, work: &Work) -> Work {
+        let left = work.limit.saturating_sub(work.done);
+        Work::up_to(left.min(WORK_PER_EDGE * (self.window.len() as u64 + FEW_EDGES)))
     }
 
     /// Turns a run of nodes on a leg so that fewer pairs cross; whether any does.
@@ -167,6 +223,74 @@ impl Untangling<'_> {
             self.linkage.change.angles.push((node, ratio));
         }
         true
+    }
+
+    /// Makes a subtree small or narrow so that fewer pairs cross, the cheapest way first; whether any does.
+    fn retreat(&mut self, work: &mut Work) -> bool {
+        let mut ways = Vec::new();
+        for top in self.subtrees_of_crossings() {
+            for way in RETREATS {
+                if self.set_retreat(top, way) {
+                    ways.push((-self.linkage.loss_gain(), top, way));
+                }
+            }
+        }
+        ways.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (_, top, way) in ways {
+            if work.is_spent() {
+                return false;
+            }
+            self.set_retreat(top, way);
+            if self.make_if_fewer(Rule::Crossings, work) {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// The first nodes of the segments on the legs of the first crossing pairs.
+    fn subtrees_of_crossings(&self) -> Vec<usize> {
+        let starts_segment = |&node: &usize| {
+            let hub = self.problem.parent[node] as usize;
+            hub == 0 || self.problem.tree.children(hub).len() > 1
+        };
+        let mut tops: Vec<usize> = Vec::new();
+        for &(a, b) in self.crossings.iter().take(MAX_PAIRS) {
+            tops.extend(self.legs(a as usize, b as usize).into_iter().flatten().filter(starts_segment));
+        }
+        tops.sort_unstable();
+        tops.dedup();
+        tops
+    }
+
+    /// The change by which a subtree gets out of the way; whether it is in range.
+    fn set_retreat(&mut self, top: usize, way: Retreat) -> bool {
+        let (problem, linkage) = (self.problem, &mut self.linkage);
+        let range = problem.tree.subtree(top);
+        linkage.change.clear();
+        match way {
+            Retreat::Shrink(scale) => {
+                let segments = problem.branch[top] as usize..problem.branch[range.end - 1] as usize + 1;
+                for segment in segments.filter(|&segment| problem.free_length[segment]) {
+                    let length = scale * (1.0 + linkage.shape.length_ratio[segment]);
+                    linkage.change.lengths.push((segment, (length - 1.0).max(ratio::LENGTH_RANGE.0)));
+                }
+            }
+            Retreat::Fan { width, turn_rad } => {
+                let old = deviation(problem, top, linkage.shape.angle_ratio[top]);
+                let Some(ratio) = ratio_of(problem, top, old + turn_rad) else { return false };
+                linkage.change.angles.push((top, ratio));
+                for node in range.skip(1) {
+                    let (target, side) = (problem.bend[node], problem.side[node]);
+                    let bend = ratio::embedded_bend(target, self.cone.angle_ratio[node]);
+                    let Some(ratio) = ratio_of(problem, node, side * (width * bend - target)) else {
+                        return false;
+                    };
+                    linkage.change.angles.push((node, ratio));
+                }
+            }
+        }
+        linkage.change.angles.iter().all(|&(node, _)| problem.free_angle[node])
     }
 
     /// Goes a part of the way to the cone.
