@@ -21,6 +21,9 @@
 //! **Guarantees** sizes of bends stay, up to the distance that siblings keep. Without a crossing at the start
 //! nothing changes. Never more crossings than at the start.
 //! **Differs from the prototype** it mirrored whole local planes first, which finds nothing that single turns do not.
+//! Why not a swarm over the mirror bits? Of seven neurons of 135 to 300 nodes whose planes cross, a binary swarm with one
+//! bit per plane ended without a crossing on three, and with 1, 1, 2 and 4 on the others, after 123,000 evaluations;
+//! these walks end without on all seven, after 71,000 to 122,000.
 //! **Source** ours; a local plane and its mirror image are equally good views, and [Hu2022] leaves the choice open.
 //! **Cost** see `hierarchy`; evaluations and the blocks that they look at are counted, and limited by N.
 
