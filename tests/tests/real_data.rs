@@ -1,10 +1,11 @@
 //! The whole way on other people's scans, masks and neurons: certified, and plausible.
 #![allow(clippy::expect_used, reason = "a test says what it expects")]
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use espalier_pipeline::Override;
-use espalier_tests::{real_data, results, run, set, small_swarm};
+use espalier_model::{Tree, swc};
+use espalier_pipeline::{Override, Stage, verify};
+use espalier_tests::{real_data, results, run, run_range, set, small_swarm};
 
 /// What a run must come to.
 struct Expected {
@@ -85,4 +86,81 @@ fn hemibrain_neuron() {
         set("embed.pso.iterations", 1),
     ];
     check("neurons/hemibrain_722817260.swc", &voxels, &Expected { tips: 300..=3000, length_mm: 0.5..=20.0 });
+}
+
+/// Every well-formed traced neuron, with little work: certified. `scripts/bench-embed` gives them the whole.
+#[test]
+fn every_neuron_is_certified() {
+    use espalier_embed::{Method, Params, SolverParams, embed};
+    use espalier_views::find_views;
+
+    /// Larger ones take minutes in a debug build.
+    const MOST_NODES: usize = 1000;
+    let Some(data) = real_data() else { return };
+    let mut n_trees = 0;
+    for file in swc_files(&data.join("neurons")) {
+        let Some(tree) = traced_tree(&file).filter(|tree| tree.n_nodes() <= MOST_NODES) else { continue };
+        let views = find_views(&tree, &espalier_views::Params::default(), 0).expect("views").hierarchy;
+        let solver = SolverParams { effort: 0.01, ..SolverParams::default() };
+        let params = Params { method: Method::Solver, methods: Vec::new(), solver, ..Params::default() };
+        let embedding = embed(&tree, &views, &params, 0, &|_| {}).expect("a layout").embedding;
+        let found = espalier_verify::meetings(&tree, &embedding.positions_mm);
+        assert_eq!((embedding.certificate.crossings, found.count), (0, 0), "{}", file.display());
+        n_trees += 1;
+    }
+    assert!(n_trees >= 50, "{n_trees} trees in the data");
+}
+
+/// Every `.swc` file in a folder and below, in a fixed order.
+fn swc_files(folder: &Path) -> Vec<PathBuf> {
+    let (mut files, mut folders) = (Vec::new(), vec![folder.to_owned()]);
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).expect("folder") {
+            let path = entry.expect("entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "swc") {
+                files.push(path);
+            }
+        }
+    }
+    files.sort();
+    files
+}
+
+/// The tree of a traced neuron; `None` if the file is not well-formed.
+fn traced_tree(file: &Path) -> Option<Tree> {
+    let bytes = std::fs::read(file).expect("bytes");
+    let (traced, _) = swc::parse(&bytes, &swc::SwcScale::micrometres()).ok()?;
+    Some(espalier_tree::from_traced(&traced, &espalier_tree::Params::default()).ok()?.tree)
+}
+
+/// A run whose folder says nothing that does not hold.
+#[track_caller]
+fn verified(input: &str, overrides: &[Override]) {
+    let Some(data) = real_data() else { return };
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let mut all = small_swarm();
+    all.push(set("embed.solver.effort", 0.01));
+    all.extend(overrides.iter().cloned());
+    run_range(&data.join(input), folder.path(), &all, (None, Some(Stage::Embed))).expect("a run");
+    let verification = verify(folder.path(), Some(2)).expect("a readable folder");
+    verification.verdict().expect("every claim holds");
+}
+
+#[test]
+fn airways_of_others() {
+    verified("volumes/airquant_airway.nii.gz", &[set("tree.root", "superior")]);
+    verified("volumes/totalseg_pulmonary_airway.nii.gz", &[set("tree.root", "superior")]);
+    verified("volumes/medmpd_lungs1_bronchi.nii.gz", &[]);
+}
+
+#[test]
+fn vessels_with_hundreds_of_loops() {
+    verified("volumes/medmpd_brain2_vessels.nii.gz", &[]);
+    verified("volumes/medmpd_lungs2_vessels.nii.gz", &[]);
+    verified(
+        "volumes/ct_avm_head_cta.nii.gz",
+        &[set("volume.method", "threshold"), set("volume.lower", 200)],
+    );
 }

@@ -16,7 +16,7 @@ pub(crate) struct Measured {
     pub(crate) seconds: Vec<(String, f64)>,
     /// All of it.
     pub(crate) total_seconds: f64,
-    /// How the swarm went, with the seconds since it began.
+    /// How the first swarm went, with the seconds since it began.
     pub(crate) swarm: Vec<(f64, Progress)>,
 }
 
@@ -25,11 +25,17 @@ impl Measured {
         self.embedding.methods.iter().find(|row| row.method.starts_with(method))
     }
 
-    /// The seconds of a method; the solver's with the search for sides, which is its first part.
+    /// The seconds of the first row of a method.
     pub(crate) fn seconds_of(&self, name: &str) -> f64 {
-        let own =
-            self.seconds.iter().find(|(method, _)| method.starts_with(name)).map_or(0.0, |(_, own)| *own);
-        if name.starts_with("solver") { own + self.targets_seconds } else { own }
+        let rows = &self.embedding.methods;
+        rows.iter().position(|row| row.method.starts_with(name)).map_or(0.0, |idx| self.seconds_of_row(idx))
+    }
+
+    /// The seconds of a row; the solver's with the search for sides, which is its first part. Rows stand in the order
+    /// in which methods ran, and one may have run twice, against other targets.
+    pub(crate) fn seconds_of_row(&self, idx: usize) -> f64 {
+        let (name, own) = &self.seconds[idx];
+        if name.starts_with("solver") { own + self.targets_seconds } else { *own }
     }
 }
 
@@ -64,7 +70,10 @@ pub(crate) fn measure(
                 log.started = Some(now);
                 log.targets_seconds.get_or_insert(now);
             }
-            Event::Searching(progress) => log.swarm.push((since, progress)),
+            // A second swarm has other targets.
+            Event::Searching(progress) if log.seconds.iter().all(|(name, _)| !name.starts_with("pso")) => {
+                log.swarm.push((since, progress));
+            }
             Event::Finished { name } => log.seconds.push((name, since)),
             _ => {}
         }

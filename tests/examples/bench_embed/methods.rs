@@ -10,9 +10,9 @@ use crate::trees::{Named, trees};
 use crate::{Options, Swarm};
 
 /// Up to so many nodes the swarm has its full size, beyond fewer particles for equal work.
-const FULL_SWARM_NODES: usize = 300;
+const FULL_SWARM_NODES: u32 = 300;
 /// Beyond so many there is none.
-const MOST_SWARM_NODES: usize = 5000;
+const MOST_SWARM_NODES: u32 = 5000;
 /// Metric 2 of two layouts that differ by less is equal: rounding of the coordinates.
 const EQUAL: f64 = 1e-9;
 
@@ -45,8 +45,8 @@ pub(crate) fn print(options: &Options) -> Result<bool, Box<dyn Error>> {
                 continue;
             }
         };
-        for row in &measured.embedding.methods {
-            print_row(&named, &measured, row);
+        for (idx, row) in measured.embedding.methods.iter().enumerate() {
+            print_row(&named, row, measured.seconds_of_row(idx));
         }
         if !measured.embedding.methods.iter().any(|row| row.method.starts_with("pso")) {
             println!("{} | pso | {} | – ", named.name, named.tree.n_nodes());
@@ -58,21 +58,17 @@ pub(crate) fn print(options: &Options) -> Result<bool, Box<dyn Error>> {
 }
 
 fn measure_all(named: &Named, swarm: Swarm) -> Result<Measured, Box<dyn Error>> {
-    let n_nodes = named.tree.n_nodes();
     let mut methods = vec![Method::Projection, Method::Radial, Method::Marino, Method::Cone, Method::Solver];
-    let mut pso = PsoParams::default();
-    if swarm == Swarm::Full {
-        let full = PsoParams::paper();
-        let particles = full.particles as usize * FULL_SWARM_NODES / n_nodes.max(FULL_SWARM_NODES);
-        pso = PsoParams { particles: particles.max(3) as u32, ..full };
-    }
-    if swarm != Swarm::None && n_nodes <= MOST_SWARM_NODES {
+    if swarm != Swarm::None {
         methods.push(Method::Pso);
     }
+    let paper =
+        PsoParams { full_size_nodes: FULL_SWARM_NODES, max_nodes: MOST_SWARM_NODES, ..PsoParams::paper() };
+    let pso = if swarm == Swarm::Full { paper } else { PsoParams::default() };
     measure(&named.tree, &views(&named.tree)?, &Params { methods, pso, ..Params::default() })
 }
 
-fn print_row(Named { name, tree }: &Named, measured: &Measured, row: &MethodRow) {
+fn print_row(Named { name, tree }: &Named, row: &MethodRow, seconds: f64) {
     let losses = &row.losses;
     let pair = |mean: f64, max: f64| format!("{} / {}", short(mean), short(max));
     let cells = [
@@ -87,7 +83,7 @@ fn print_row(Named { name, tree }: &Named, measured: &Measured, row: &MethodRow)
         pair(losses.angle3d_loss_mean, losses.angle3d_loss_max),
         pair(losses.angle3d_error_mean_deg, losses.angle3d_error_max_deg),
         format!("{:.4}", losses.stress),
-        format!("{:.3}", measured.seconds_of(&row.method)),
+        format!("{seconds:.3}"),
         row.crossings.to_string(),
         row.evaluations.to_string(),
         row.targets.name().to_owned(),
