@@ -26,7 +26,7 @@ const TITLE: f64 = 1.4;
 const SMALL: f64 = 1.1;
 const HEIGHT: f64 = 17.0;
 const LEFT: f64 = 4.6;
-const BELOW: f64 = 4.2;
+const BELOW: f64 = 5.6;
 const GAP: f64 = 2.4;
 /// Line height over font size.
 const LEADING: f64 = 1.5;
