@@ -311,7 +311,7 @@ fn at_widths(
         positions,
         evaluations: 0,
         trace: Vec::new(),
-        termination: winner.termination,
+        termination: Termination::Converged,
         aim: Aim::Frozen,
     };
     let mut changed = judge((problem, space), winner.method, layout, posed);
