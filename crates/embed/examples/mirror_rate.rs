@@ -1,16 +1,17 @@
 //! What the search for sides finds, and how fast it is.
 //!
-//! `cargo run --release -p espalier-embed --example mirror_rate -- [effort=E] [seed=S] TREE.swc|neuron|airway|vessel[@SEED]…`
+//! `cargo run --release -p espalier-embed --example mirror_rate -- [effort=E] [seed=S] [curl]
+//! TREE.swc|neuron|airway|vessel[@SEED]…`; `curl` lets branches pass the trunk.
 //!
-//! One line per tree: nodes N, segments M, crossings and pairs that are too near before and after, changes of sides
-//! inside segments, evaluations, microseconds per evaluation (of all walks together), seconds. Times are those of a
-//! run with the search less those of one without.
+//! One line per tree: nodes N, segments M, crossings, pairs that are too near and edges behind the root before and
+//! after, changes of sides inside segments, evaluations, microseconds per evaluation (of all walks together), seconds.
+//! Times are those of a run with the search less those of one without.
 #![allow(clippy::print_stdout, clippy::disallowed_methods, reason = "an example that measures")]
 
 use std::error::Error;
 use std::time::Instant;
 
-use espalier_embed::{Method, Params, SolverParams, embed};
+use espalier_embed::{KeepOut, Method, Params, SolverParams, embed};
 use espalier_model::swc::{SwcScale, parse};
 use espalier_model::{Node, Tree};
 use espalier_phantom::Kind;
@@ -26,6 +27,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             params.solver.effort = effort.parse()?;
         } else if let Some(number) = word.strip_prefix("seed=") {
             seed = number.parse()?;
+        } else if word == "curl" {
+            params.solver.root_keep_out = KeepOut::Off;
         } else {
             measure(&word, &params, seed)?;
         }
@@ -52,7 +55,7 @@ fn measure(word: &str, params: &Params, seed: u64) -> Result<(), Box<dyn Error>>
     let count = |name: &str| report.0.get(name).unwrap_or(f64::NAN);
     let evaluations = count("mirror_evaluations");
     println!(
-        "{name:<34} N {:>6} M {:>5} X {:>5} -> {:<4} near {:>4} -> {:<4} zigzags {:>4} ({:.1} rad) placement {:.3} \
+        "{name:<34} N {:>6} M {:>5} X {:>5} -> {:<4} near {:>4} -> {:<4} behind {:>3} -> {:<3} zigzags {:>4} ({:.1} rad) placement {:.3} \
          evaluations {evaluations:>9} {:>6.1} µs {seconds:.2} s",
         tree.n_nodes(),
         tree.branches().list().len(),
@@ -60,6 +63,8 @@ fn measure(word: &str, params: &Params, seed: u64) -> Result<(), Box<dyn Error>>
         count("mirror_crossings"),
         count("mirror_near_before"),
         count("mirror_near"),
+        count("mirror_behind_root_before"),
+        count("mirror_behind_root"),
         count("mirror_zigzags"),
         count("mirror_zigzags_rad"),
         count("mirror_misplacement"),

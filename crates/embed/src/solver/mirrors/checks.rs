@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use espalier_geom::math::unit_vector;
 use espalier_geom::random::Stream;
 use espalier_model::Tree;
 use espalier_phantom::{Kind, grow_tree};
@@ -13,6 +14,7 @@ use super::moves::Mover;
 use super::setting::Setting;
 use super::state::{Prices, State, Step};
 use super::{Mirrored, search};
+use crate::choices::KeepOut;
 use crate::common::{FAMILIES, random_tree, stream, tree_of, views_along};
 use crate::params::{Params, SolverParams};
 use crate::problem::Problem;
@@ -178,6 +180,29 @@ fn never_more_crossings_and_nothing_changes_without() {
         }
     }
     assert!(n_better > 10, "{n_better}");
+}
+
+#[test]
+fn a_branch_that_curls_past_its_trunk_is_turned_away() {
+    // An arc of a circle that begins at the root and ends behind it, crossing nothing.
+    let mut nodes = vec![(0.0, 0.0, 0.0, None)];
+    for step in 0..16 {
+        let direction = unit_vector(f64::from(step) * 0.31);
+        let (x, y, z, _) = nodes[nodes.len() - 1];
+        nodes.push((x + direction.x, y + direction.y, z, Some(nodes.len() - 1)));
+    }
+    let tree = tree_of(&nodes);
+    let problem = problem(&tree);
+    let with =
+        |root_keep_out| search(&problem, &SolverParams { root_keep_out, ..SolverParams::default() }, 0);
+    let found = with(KeepOut::On);
+    assert!(found.terms_at_start.kept_out > 0 && found.terms.kept_out + found.terms.crossings == 0);
+    assert!(found.n_zigzags > 0);
+    // Nothing crosses, so the other choices leave the tree as its view shows it.
+    for choice in [KeepOut::Off, KeepOut::Auto] {
+        let found = with(choice);
+        assert!(found.targets.angle_rad[1..] == problem.targets.angle_rad[1..]);
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 //! | file | what |
 //! |---|---|
 //! | `setting` | what stays the same: bends, angles in space, headings, the rule of faults |
-//! | `isometry`, `hierarchy`, `conflicts` | parts of the tree that move as a whole, and who meets whom |
+//! | `isometry`, `rectangle`, `hierarchy`, `conflicts` | parts of the tree that move as a whole, and who meets whom |
 //! | `state` | the layout, what a move would change, and taking it |
 //! | `moves` | which turns change sides together |
 //! | `anneal` | the walk |
@@ -113,6 +113,8 @@ pub(crate) fn mirrored<'t>(
     report.count_usize("mirror_crossings", found.terms.crossings);
     report.count_usize("mirror_near_before", found.terms_at_start.near);
     report.count_usize("mirror_near", found.terms.near);
+    report.count_usize("mirror_behind_root_before", found.terms_at_start.kept_out);
+    report.count_usize("mirror_behind_root", found.terms.kept_out);
     report.count_usize("mirror_zigzags", found.n_zigzags);
     report.count("mirror_zigzags_rad", found.terms.zigzags_rad);
     report.count("mirror_misplacement", found.terms.placement);
