@@ -247,3 +247,22 @@ fn trees_with_little_to_edit() {
     assert!(after.certificate.holds());
     assert_kept(&star, &base(&star), &after, &edit);
 }
+
+#[test]
+fn large_and_odd_trees() {
+    // A comb of a thousand teeth, and a chain; an edit near the root moves nearly all of it.
+    let solver = Params { methods: Vec::new(), ..Params::default() };
+    for family in [2, 5] {
+        let tree = random_tree(family, 2000, 0.0, false, 3);
+        let edits = Edits::new(&tree, vec![Edit { branch: 0, node: 0, angle_deg: 20.0 }]).expect("edits");
+        let views = views_along(&tree, DVec3::Z);
+        let quick = Params {
+            solver: espalier_embed::SolverParams { mirrors: false, effort: 0.02, ..solver.solver.clone() },
+            ..solver.clone()
+        };
+        match embed_edited((&tree, &views), &edits, &quick, 0, &|_| {}) {
+            Ok(embedded) => assert!(embedded.embedding.certificate.holds()),
+            Err(error) => assert!(matches!(error, Error::Edits { .. }), "{error}"),
+        }
+    }
+}

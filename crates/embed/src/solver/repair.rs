@@ -19,8 +19,11 @@ use crate::problem::Problem;
 use crate::ratio;
 use crate::separation::Separation;
 
-/// Work of the untangling for a node, times the effort.
+/// Work of the untangling for a node, times the effort: some searches for each crossing of a small tree.
 const WORK_PER_NODE: f64 = 3e5;
+/// In a large tree no more than this, and so much for a node: an edit that cannot be freed shall end soon too.
+const WORK_LARGE: f64 = 1e8;
+const WORK_PER_NODE_LARGE: f64 = 2e4;
 
 /// A repaired layout.
 pub(crate) struct Repaired {
@@ -33,8 +36,9 @@ pub(crate) struct Repaired {
 
 /// Takes the crossings out of `start`, and lowers the loss of what may move.
 pub(crate) fn repair(problem: &Problem, start: Shape, params: &Params) -> Repaired {
-    let limit = (params.solver.effort * WORK_PER_NODE * problem.n_nodes() as f64) as u64;
-    let mut work = Work::up_to(limit);
+    let n_nodes = problem.n_nodes() as f64;
+    let limit = (WORK_PER_NODE * n_nodes).min(WORK_LARGE + WORK_PER_NODE_LARGE * n_nodes);
+    let mut work = Work::up_to((params.solver.effort * limit) as u64);
     let mut shape = start;
     if n_crossings(problem, &shape) > 0 {
         shape = untangled(problem, shape, params, &mut work);
