@@ -17,7 +17,7 @@ use crate::Options;
 use crate::measure::views;
 
 /// Work that the solver may take per tree: the campaign looks for crossings, not for the last percent.
-const EFFORT: f64 = 0.1;
+const EFFORT: f64 = 0.02;
 /// A tree that takes longer is named.
 const SLOW_SECONDS: f64 = 60.0;
 
@@ -34,13 +34,13 @@ pub(crate) fn print(options: &Options) -> Result<bool, Box<dyn Error>> {
     let start = Instant::now();
     let keys: Vec<u32> = (0..options.n_trees).map(|idx| options.seed.wrapping_add(idx)).collect();
     let mut all = Vec::new();
-    for (done, part) in keys.chunks(200).enumerate() {
+    for (done, part) in keys.chunks(40).enumerate() {
         let outcomes: Vec<Outcome> = part.par_iter().map(|&key| run(key, options.largest)).collect();
         for fault in outcomes.iter().filter_map(|outcome| outcome.fault.as_ref()) {
             println!("FAILED {fault}");
         }
         all.extend(outcomes);
-        if done % 5 == 4 {
+        if done % 5 == 4 || part.len() < 40 {
             println!("{} trees, {:.0} s", all.len(), start.elapsed().as_secs_f64());
         }
     }
