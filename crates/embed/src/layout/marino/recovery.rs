@@ -7,7 +7,7 @@
 //! **Guarantees** no crossing after any step. Σ |Δ| never rises: a turn changes its own Δ only, towards 0.
 //! **Source** [Marino2015]. **Differs from the source** κ, the bounds and the order of the sweeps are ours.
 //! **Cost** a few hundred pairs of circles per step (see `circles`), N steps per sweep, 60 to 130 sweeps; bounded by
-//! work, so that above some 20,000 nodes, and on large stars, the recovery is cut short, which the row then says.
+//! work, so that above some 10,000 nodes, and on large stars, the recovery is cut short, which the row then says.
 
 use espalier_geom::math;
 use glam::DVec2;
