@@ -15,7 +15,7 @@ mod plot;
 mod rows;
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use espalier_model::MethodRow;
 use espalier_model::diagnose::{Class, Diagnose};
@@ -103,7 +103,7 @@ pub fn sweep(request: &SweepRequest, events: &(dyn Fn(Event) + Sync)) -> Result<
     let mut done = Vec::new();
     for (idx, (values, config)) in combinations.into_iter().zip(configs).enumerate() {
         let folder = out.join("runs").join(format!("{:03}", idx + 1));
-        let outcome = match config.and_then(|loaded| base.embed(request, loaded, folder)) {
+        let outcome = match config.and_then(|loaded| base.embed(request, loaded, &folder)) {
             Ok(row) => Ok(row),
             Err(error) if matches!(error.class(), Class::Io | Class::CannotCreate | Class::Locked) => {
                 return Err(error);
@@ -196,7 +196,7 @@ impl Base {
         request: &SweepRequest,
         first: &Loaded,
         changed: Stage,
-        (out, events): (&std::path::Path, &(dyn Fn(Event) + Sync)),
+        (out, events): (&Path, &(dyn Fn(Event) + Sync)),
     ) -> Result<Self, Error> {
         let source = run::source_of(first, request.data_dir.as_deref())?;
         let stages = run::stages_of(&source);
@@ -215,15 +215,15 @@ impl Base {
     }
 
     /// Embeds a combination in a folder of its own, and gives the row of its embedding as it was written.
-    fn embed(&self, request: &SweepRequest, loaded: Loaded, folder: PathBuf) -> Result<MethodRow, Error> {
-        let run = request_of(request, loaded, folder.clone(), (self.from, Stage::Embed));
+    fn embed(&self, request: &SweepRequest, loaded: Loaded, folder: &Path) -> Result<MethodRow, Error> {
+        let run = request_of(request, loaded, folder.to_owned(), (self.from, Stage::Embed));
         run::run(&Request { files: self.files.clone(), ..run }, &|_| {})?;
         let read_options = espalier_volume::ReadOptions {
             max_bytes: request.max_memory_bytes,
             ..espalier_volume::ReadOptions::default()
         };
         let mut artifacts = Artifacts { files: self.files.clone(), read_options, ..Artifacts::default() };
-        let folder = RunFolder::to_read(&folder);
+        let folder = RunFolder::to_read(folder);
         let lookup = Lookup { folder: &folder, stage: Stage::Embed };
         let tree = artifacts.tree(lookup)?;
         let path = folder.path().join(Artifact::Comparison.file());
