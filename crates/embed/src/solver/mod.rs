@@ -51,6 +51,8 @@ pub(crate) use work::Work;
 
 /// Units of work that a start may take, for each edge.
 const WORK_PER_EDGE: u64 = 150_000;
+/// What untangling may take of the work: a tree that takes more is better off from the cone.
+const UNTANGLING_SHARE: f64 = 0.25;
 /// What one descent may take of the work: where much has to be moved the barrier is faster.
 const DESCENT_SHARE: f64 = 0.05;
 /// A round of barrier and descent that gains less than this share of the energy is the last.
@@ -66,25 +68,31 @@ pub(crate) fn layout(problem: &Problem, cone: &[f64], params: &Params) -> Layout
         return run.into_layout(Termination::Optimal);
     }
     let cone = Shape::from_headings(problem, cone);
-    let improve = |start: &dyn Fn(&mut Work) -> Shape| {
+    let from_cone = || {
         let mut run = Run::new(problem, &params.solver, cone.clone());
-        run.shape = start(&mut run.work);
         run.improve(&separation);
         run
     };
-    let (from_cone, from_targets) = rayon::join(
-        || improve(&|_| cone.clone()),
-        || {
-            let untangled = |work: &mut Work| untangling::untangle(problem, &separation, &cone, work);
-            params.solver.untangling.then(|| improve(&untangled))
-        },
-    );
-    let best = match from_targets {
-        Some(other) if other.energy() <= from_cone.energy() => other,
-        _ => from_cone,
+    let from_targets = || {
+        let mut run = Run::new(problem, &params.solver, cone.clone());
+        run.untangle(&separation);
+        run.improve(&separation);
+        run
     };
-    let is_spent = best.work.is_spent();
-    best.into_layout(if is_spent { Termination::BudgetSpent } else { Termination::Converged })
+    let best = if params.solver.untangling {
+        let (from_cone, from_targets) = rayon::join(from_cone, from_targets);
+        if from_targets.is_better(&from_cone) { from_targets } else { from_cone }
+    } else {
+        from_cone()
+    };
+    let termination = if best.is_lossless() {
+        Termination::Optimal
+    } else if best.work.is_spent() {
+        Termination::BudgetSpent
+    } else {
+        Termination::Converged
+    };
+    best.into_layout(termination)
 }
 
 /// One start on its way.
@@ -102,9 +110,19 @@ impl<'a> Run<'a> {
         Self { problem, params, shape, work: Work::up_to(limit as u64), trace: Vec::new() }
     }
 
-    /// Descends; then barrier and descent in turn, as long as it pays.
+    /// Bends the targets as little as it takes.
+    fn untangle(&mut self, separation: &Separation) {
+        let mut slice = self.work.slice(UNTANGLING_SHARE);
+        self.shape = untangling::untangle(self.problem, separation, &self.shape, &mut slice);
+        self.work.add(slice);
+    }
+
+    /// Descends; then barrier and descent in turn, as long as it pays. What has no loss is left as it is.
     fn improve(&mut self, separation: &Separation) {
         self.record();
+        if self.is_lossless() {
+            return;
+        }
         self.descend(separation);
         while self.params.barrier && !self.work.is_spent() {
             let before = self.energy();
@@ -135,6 +153,17 @@ impl<'a> Run<'a> {
             self.shape = kept;
         }
         self.record();
+    }
+
+    /// Whether all ratios are zero, so that nothing can be better but the placement.
+    fn is_lossless(&self) -> bool {
+        self.shape.loss(self.problem) == 0.0
+    }
+
+    /// Without loss, or else of less energy.
+    fn is_better(&self, other: &Self) -> bool {
+        let key = |run: &Self| (!run.is_lossless(), run.energy());
+        key(self) <= key(other)
     }
 
     fn energy(&self) -> f64 {
