@@ -178,12 +178,13 @@ mod tests {
     /// A layout with its own length for each edge, the cone's sides or the radial layout's.
     fn layout(problem: &Problem, key: u32) -> Vec<DVec2> {
         let mut stream = stream(1000 + key);
-        let headings = if key % 2 == 0 { cone::headings(problem) } else { radial::headings(problem) };
+        let headings =
+            if key.is_multiple_of(2) { cone::headings(problem) } else { radial::headings(problem) };
         let mut stretched = problem.clone();
         for node in 1..problem.n_nodes() {
             stretched.targets.length_mm[node] *= stream.uniform(0.8, 1.2);
         }
-        place::from_headings(if key % 3 == 0 { &stretched } else { problem }, &headings)
+        place::from_headings(if key.is_multiple_of(3) { &stretched } else { problem }, &headings)
     }
 
     #[test]

@@ -163,9 +163,8 @@ impl<'a> State<'a> {
 pub(crate) fn conflict(problem: &Problem, edits: &[Edit], certificate: &Certificate) -> Error {
     let mut pinned_by = vec![Vec::new(); problem.n_nodes()];
     for (idx, edit) in edits.iter().enumerate() {
-        for node in joint(problem, edit)..problem.branches.list()[edit.branch].nodes.end {
-            pinned_by[node].push(idx);
-        }
+        let pinned = joint(problem, edit)..problem.branches.list()[edit.branch].nodes.end;
+        pinned_by[pinned].iter_mut().for_each(|edits| edits.push(idx));
     }
     let mut holding: Vec<usize> = Vec::new();
     let mut can_move = true;

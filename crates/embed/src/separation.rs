@@ -47,7 +47,8 @@ impl Separation {
         if gap_mm == 0.0 { 0.0 } else { self.clearance_mm.min(GAP_SHARE * gap_mm).max(self.tolerance_mm) }
     }
 
-    /// Whether two different edges meet.
+    /// Whether two different edges meet: what tests count.
+    #[cfg(test)]
     pub(crate) fn meet(&self, problem: &Problem, positions: &[DVec2], a: usize, b: usize) -> bool {
         self.meet_at(problem, (a, b), &[segment(problem, positions, a), segment(problem, positions, b)])
     }

@@ -1,163 +1,11 @@
-//! Edges by the cells of a square grid through which they pass: who may be near whom, while edges move.
+//! The cells of a square grid through which a segment passes: who may be near whom.
 //!
-//! **Input** edges, each a segment. **Output** the edges whose cells a widened segment touches.
-//! **Steps** cells are hashed into a table of lists; an edge is entered in each cell it passes through, row by row.
-//! A question visits the cells within a margin of a segment. Entries are doubly linked, so an edge is taken out in
-//! the time it took to put it in.
-//! **Guarantees** every edge nearer than the margin is visited, once per question; the order of visits depends on
-//! the history of insertions only.
-//! **Cost** O(cells) for each operation; no allocation after the table has grown.
+//! **Input** a segment, in units of a cell, and a margin. **Output** the cells, row by row; the hash of a cell.
+//! **Guarantees** two segments nearer than the margin have a cell in common if one is visited with the margin and the
+//! other with 0; each cell of a segment is visited once.
+//! **Cost** O(cells).
 
 use glam::DVec2;
-
-const NONE: u32 = u32::MAX;
-
-/// Edges by cells.
-pub(crate) struct EdgeGrid {
-    cells_per_mm: f64,
-    /// First entry of each list; the length is a power of two.
-    heads: Vec<u32>,
-    entries: Vec<Entry>,
-    /// First entry that is free, linked by `next`.
-    free: u32,
-    /// First entry of each edge, linked by `next_of_edge`.
-    of_edge: Vec<u32>,
-}
-
-#[derive(Clone, Copy)]
-struct Entry {
-    edge: u32,
-    list: u32,
-    next: u32,
-    previous: u32,
-    next_of_edge: u32,
-}
-
-/// Which edges a question has visited.
-#[derive(Default)]
-pub(crate) struct Visited {
-    stamps: Vec<u32>,
-    stamp: u32,
-}
-
-impl Visited {
-    fn begin(&mut self, n_edges: usize) {
-        self.stamps.resize(n_edges, 0);
-        if self.stamp == u32::MAX {
-            self.stamps.fill(0);
-            self.stamp = 0;
-        }
-        self.stamp += 1;
-    }
-
-    fn is_new(&mut self, edge: u32) -> bool {
-        std::mem::replace(&mut self.stamps[edge as usize], self.stamp) != self.stamp
-    }
-}
-
-impl EdgeGrid {
-    /// An empty grid for edges 0..n.
-    pub(crate) fn new(n_edges: usize, cell_mm: f64) -> Self {
-        let n_lists = (2 * n_edges).next_power_of_two().max(16);
-        Self {
-            cells_per_mm: 1.0 / cell_mm,
-            heads: vec![NONE; n_lists],
-            entries: Vec::with_capacity(3 * n_edges),
-            free: NONE,
-            of_edge: vec![NONE; n_edges],
-        }
-    }
-
-    /// Puts an edge in, which is not in yet.
-    pub(crate) fn insert(&mut self, edge: u32, a: DVec2, b: DVec2) {
-        debug_assert!(!self.contains(edge));
-        let (a, b) = (a * self.cells_per_mm, b * self.cells_per_mm);
-        // Far less than any margin that is asked for.
-        each_cell(a, b, 1e-9, |cell| {
-            self.enter(edge, cell);
-            true
-        });
-    }
-
-    /// Takes an edge out; nothing happens if it is not in.
-    pub(crate) fn remove(&mut self, edge: u32) {
-        let mut entry_idx = std::mem::replace(&mut self.of_edge[edge as usize], NONE);
-        while entry_idx != NONE {
-            let Entry { list, next, previous, next_of_edge, .. } = self.entries[entry_idx as usize];
-            if previous == NONE {
-                self.heads[list as usize] = next;
-            } else {
-                self.entries[previous as usize].next = next;
-            }
-            if next != NONE {
-                self.entries[next as usize].previous = previous;
-            }
-            self.entries[entry_idx as usize].next = self.free;
-            self.free = entry_idx;
-            entry_idx = next_of_edge;
-        }
-    }
-
-    /// Whether an edge is in.
-    pub(crate) fn contains(&self, edge: u32) -> bool {
-        self.of_edge[edge as usize] != NONE
-    }
-
-    /// Visits the edges that may be nearer than `margin_mm` to a segment, until `visit` says no; whether it never
-    /// did.
-    pub(crate) fn each_near(
-        &self,
-        (a, b): (DVec2, DVec2),
-        margin_mm: f64,
-        visited: &mut Visited,
-        mut visit: impl FnMut(u32) -> bool,
-    ) -> bool {
-        visited.begin(self.of_edge.len());
-        let margin = margin_mm * self.cells_per_mm + 1e-9;
-        each_cell(a * self.cells_per_mm, b * self.cells_per_mm, margin, |cell| {
-            let mut entry_idx = self.heads[self.list_of(cell)];
-            while entry_idx != NONE {
-                let entry = self.entries[entry_idx as usize];
-                if visited.is_new(entry.edge) && !visit(entry.edge) {
-                    return false;
-                }
-                entry_idx = entry.next;
-            }
-            true
-        })
-    }
-
-    fn enter(&mut self, edge: u32, cell: (i32, i32)) {
-        let list = self.list_of(cell) as u32;
-        let next = self.heads[list as usize];
-        let entry = Entry { edge, list, next, previous: NONE, next_of_edge: self.of_edge[edge as usize] };
-        let entry_idx = if self.free == NONE {
-            self.entries.push(entry);
-            (self.entries.len() - 1) as u32
-        } else {
-            let entry_idx = self.free;
-            self.free = self.entries[entry_idx as usize].next;
-            self.entries[entry_idx as usize] = entry;
-            entry_idx
-        };
-        if next != NONE {
-            self.entries[next as usize].previous = entry_idx;
-        }
-        self.heads[list as usize] = entry_idx;
-        self.of_edge[edge as usize] = entry_idx;
-    }
-
-    fn list_of(&self, cell: (i32, i32)) -> usize {
-        mix(cell) & (self.heads.len() - 1)
-    }
-}
-
-/// The hash of a cell.
-pub(super) fn mix((column, row): (i32, i32)) -> usize {
-    // Two odd constants near 2³² / golden ratio and its square spread neighbours over the table.
-    let mixed = (column as u32).wrapping_mul(0x9E37_79B1) ^ (row as u32).wrapping_mul(0x85EB_CA77);
-    (mixed ^ (mixed >> 15)) as usize
-}
 
 /// Visits the cells within `margin` of a segment, all in units of a cell, until `visit` says no; whether it never
 /// did.
@@ -182,6 +30,13 @@ pub(super) fn each_cell(a: DVec2, b: DVec2, margin: f64, mut visit: impl FnMut((
     true
 }
 
+/// The hash of a cell.
+pub(super) fn mix((column, row): (i32, i32)) -> usize {
+    // Two odd constants near 2³² / golden ratio and its square spread neighbours over the table.
+    let mixed = (column as u32).wrapping_mul(0x9E37_79B1) ^ (row as u32).wrapping_mul(0x85EB_CA77);
+    (mixed ^ (mixed >> 15)) as usize
+}
+
 fn floor(x: f64) -> i32 {
     espalier_geom::math::floor(x) as i32
 }
@@ -193,38 +48,52 @@ mod tests {
     use super::*;
     use crate::common::stream;
 
+    fn cells((a, b): (DVec2, DVec2), margin: f64) -> Vec<(i32, i32)> {
+        let mut cells = Vec::new();
+        assert!(each_cell(a, b, margin, |cell| {
+            cells.push(cell);
+            true
+        }));
+        cells
+    }
+
     #[test]
-    fn nothing_near_is_missed_while_edges_come_and_go() {
+    fn near_segments_have_a_cell_in_common() {
         let mut stream = stream(4100);
-        let n_edges = 200;
-        let mut grid = EdgeGrid::new(n_edges, 0.7);
-        let mut edges: Vec<Option<(DVec2, DVec2)>> = vec![None; n_edges];
-        let mut visited = Visited::default();
-        for round in 0..4000 {
-            let edge = stream.below(n_edges as u32);
+        let mut n_near = 0;
+        for round in 0..20_000 {
             let mut point = |scale: f64| DVec2::new(stream.normal(), stream.normal()) * scale;
-            let (a, margin) = (point(5.0), point(0.5).x.abs());
-            let b = if round % 7 == 0 { a + DVec2::new(3.0, 0.0) } else { a + point(1.0) };
-            if grid.contains(edge) {
-                grid.remove(edge);
-                edges[edge as usize] = None;
-            } else {
-                grid.insert(edge, a, b);
-                edges[edge as usize] = Some((a, b));
+            let (a, c, margin) = (point(3.0), point(3.0), point(0.5).x.abs());
+            // Some edges are level, upright or of no length.
+            let b = match round % 7 {
+                0 => a + DVec2::new(3.0, 0.0),
+                1 => a + DVec2::new(0.0, 3.0),
+                2 => a,
+                _ => a + point(1.0),
+            };
+            let d = c + point(2.0);
+            let (own, near) = (cells((a, b), 1e-9), cells((d, c), margin + 1e-9));
+            for visited in [&own, &near] {
+                let mut distinct = visited.clone();
+                distinct.sort_unstable();
+                distinct.dedup();
+                assert_eq!(distinct.len(), visited.len(), "round {round}: a cell is visited twice");
             }
-            let mut found = Vec::new();
-            assert!(grid.each_near((b, a), margin, &mut visited, |edge| {
-                found.push(edge);
-                true
-            }));
-            let asked = Segment { a, b };
-            for (edge, place) in edges.iter().enumerate() {
-                let n_found = found.iter().filter(|&&other| other == edge as u32).count();
-                let is_near =
-                    place.is_some_and(|(a, b)| segment_distance(&asked, &Segment { a, b }) < margin);
-                assert!(n_found <= 1 && (n_found == 1 || !is_near), "round {round}: edge {edge}");
-                assert!(n_found == 0 || place.is_some(), "round {round}: edge {edge} is gone");
+            if segment_distance(&Segment { a, b }, &Segment { a: c, b: d }) < margin {
+                n_near += 1;
+                assert!(own.iter().any(|cell| near.contains(cell)), "round {round}");
             }
         }
+        assert!(n_near > 500, "{n_near}");
+    }
+
+    #[test]
+    fn a_visit_ends_when_it_is_told_to() {
+        let mut n_visits = 0;
+        assert!(!each_cell(DVec2::ZERO, DVec2::new(9.0, 4.0), 0.5, |_| {
+            n_visits += 1;
+            n_visits < 3
+        }));
+        assert_eq!(n_visits, 3);
     }
 }
