@@ -4,7 +4,8 @@
 //! **Notation** l target length, l_e embedded length, h heading, H heading in the global view, p cost of a node's
 //! placement. **Steps** 1. r_l = l_e / l − 1 and r_a by the inverse of equation 3. 2. Σ over segments of
 //! w_l · mean r_l² + w_a · mean r_a² (Eq. 4, equal to the printed one where a segment has one ratio).
-//! Beside it w_s · mean of how far a turn is on the other side of its target. 3. Placement: Σ p wrap(h + φ − H)², φ the rotation for which Σ p cos(h + φ − H) is largest.
+//! Beside it w_s · mean of how far a turn is on the other side of its target. 3. Placement: Σ p wrap(h + φ − H)², φ
+//! the rotation for which Σ p cos(h + φ − H) is largest.
 //! **Guarantees** a deviation that rounding to the quantum explains counts as none, so that a layout that meets
 //! all targets has energy 0 after rounding too. No loss for the angles of the root's children.
 //! **Source** [Hu2022] Eq. 4. **Differs from the source** the side and placement terms are ours.

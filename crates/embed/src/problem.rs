@@ -3,7 +3,8 @@
 //! **Input** tree, targets, params. **Output** `Problem`. **Notation** N nodes, M segments (branches), L the
 //! tree's length; arrays have one entry per node, that of the root is 0.
 //! **Guarantees** with `w_crossing = "auto"` one crossing costs more than any layout without crossings: length
-//! ratios are in (−1, 1], angle ratios in [−1, 2], headings at most π off, so E ≤ M (w_l + 4 w_a + w_s + π² w_g), of weights that differ the largest.
+//! ratios are in (−1, 1], angle ratios in [−1, 2], headings at most π off, so E ≤ M (w_l + 4 w_a + w_s + π² w_g), of
+//! weights that differ the largest.
 //! **Source** [Hu2022] section 3.2.2.
 //! **Differs from the source** its largest angle loss is 1, because its layouts never change the side of a turn;
 //! baselines do, and shall be scored by the same energy.

@@ -35,7 +35,7 @@ pub struct Params {
     /// `method` itself. Default all.
     pub methods: Vec<Method>,
     /// What a swarm of the size of `[embed.pso]` does after the solver: `polish` searches around its layout, with all
-    /// layouts of the run as particles, and is a row of its own. Default `none`: after the search of sides all of nine
+    /// layouts of the run as particles, and is a row of its own. Default `none`: after the search of sides all of seven
     /// trees of 135 to 300 nodes had nothing left to polish, and 828 nodes gained 0.3 %. Without that search five small
     /// ones gained 0.3 to 7 % in 0.2 s, two of 1,000 nodes 0.1 to 0.2 %; 2,048 particles × 200 iterations gained no more.
     pub swarm: SwarmUse,

@@ -3,10 +3,10 @@
 //! **Input** ratios x without crossings, the field. **Output** ratios without crossings, of no higher energy.
 //! **Steps** 1. Ratios at a bound that push outwards, and pinned ones, are held. 2. Direction by the last ten
 //! steps and the diagonal of the curvature. 3. Try the step, cut at the bounds. Where edges meet, only the ratios
-//! on the tree paths between them move less. 4. If the total falls
-//! too little, all move less. 5. Of all that was accepted, the one with the least energy is kept, or
-//! the last one.
-//! **Guarantees** the kept ratios have no edges that meet. Under `LeastEnergy` their energy is at most that of the start.
+//! on the tree paths between them move less. 4. If the total falls too little, all move less. 5. Of all that was
+//! accepted, the one with the least energy is kept, or the last one.
+//! **Guarantees** the kept ratios have no edges that meet. Under `LeastEnergy` their energy is at most that of the
+//! start.
 //! **Cost** iterations · (evaluations per step, mostly 1–2) · O(N + pairs).
 
 use super::super::work::Work;
@@ -21,8 +21,9 @@ const LEAST_DECREASE: f64 = 1e-4;
 const MOST_TRIALS: usize = 16;
 /// From this trial on everything moves less where edges meet, not only what is on their paths.
 const PATHS_ONLY: usize = 10;
-/// What is left of a ratio's step when edges met that it moves against each other; from the third trial on its square. The next step begins whole: where
-/// ratios had to recover over several steps, five trees ended at 2 to 9 times the energy.
+/// What is left of a ratio's step when edges met that it moves against each other; from the third trial on its
+/// square. The next step begins whole: where ratios had to recover over several steps, five trees ended at 2 to 9
+/// times the energy.
 const SHRINK: f64 = 0.5;
 /// No ratio moves by more than this in one step.
 const LONGEST_STEP: f64 = 0.3;
