@@ -1,8 +1,9 @@
 //! Small line charts of numbers against a setting, in one figure.
 //!
 //! **Input** values by chart, series and place on the x axis. **Output** PNG and SVG.
-//! **Steps** charts stand in rows of three under one heading; every y axis begins at 0 and ends at a round number; each
-//! series has one colour in all charts, named below. A value that is missing leaves a gap in its line.
+//! **Steps** charts stand in rows of three under one heading; every y axis begins at 0 and ends a little above the
+//! largest value, with ticks at round numbers; each series has one colour in all charts, named below. A value that is
+//! missing leaves a gap in its line.
 //! **Cost** O(values).
 
 use std::fmt::Write as _;

@@ -2,8 +2,9 @@
 //!
 //! **Input** for each tree its global view and the layouts of its methods. **Output** PNG and SVG.
 //! **Steps** 1. Each tree is a section: its view in space, then its layouts, tiled in rows at one scale. 2. Main
-//! subtrees have the same colours in every panel. 3. Crossings get rings; of a cluster, as many as do not hide it. 4. Below each panel its row of the table in
-//! short; what is best among the section's layouts without crossings is set bold. 5. Scale bar and key end a section.
+//! subtrees have the same colours in every panel. 3. Crossings get rings; of a cluster, as many as do not hide it.
+//! 4. Below each panel its row of the table in short; what is best among the section's layouts without crossings is
+//! set bold. 5. Scale bar and key end a section.
 //! **Guarantees** the same bytes for any number of threads. Where radii would cover a panel several times over, the
 //! section shows lines.
 //! **Source** figures of section 5 of [Hu2022]. **Cost** that of as many small pictures.
@@ -466,12 +467,15 @@ fn kinship(frame: &Frame<'_>) -> Kinship {
 
 /// What is said below a layout, each with whether it is the best of its section.
 fn notes(section: &Section<'_>, row: &MethodRow) -> Vec<(String, bool)> {
-    let planar = || section.panels.iter().map(|panel| panel.row).filter(|row| row.crossings == 0);
+    // A layout may be scored against other targets than the embedding.
+    let kind = section.panels.iter().find(|panel| panel.is_chosen).map(|panel| panel.row.targets);
+    let compares = |row: &&MethodRow| row.crossings == 0 && kind.is_none_or(|kind| kind == row.targets);
+    let planar = || section.panels.iter().map(|panel| panel.row).filter(compares);
     // What reads alike is equally good.
     let note = |of: &dyn Fn(&MethodRow) -> f64, say: &dyn Fn(f64) -> String, rest: String| {
         let least = planar().map(of).fold(f64::INFINITY, f64::min);
         let said = say(of(row));
-        let is_best = row.crossings == 0 && said == say(least);
+        let is_best = compares(&row) && said == say(least);
         (format!("{said}{rest}"), is_best)
     };
     let losses = &row.losses;

@@ -78,6 +78,28 @@ fn every_panel_has_its_branches_its_title_and_its_notes() {
 }
 
 #[test]
+fn a_layout_for_other_targets_is_not_the_best() {
+    let tree = fern(3, 3, 1.0);
+    let (views, embedding) = (front(&tree), flat(&tree));
+    let other = MethodRow { targets: TargetKind::IntrinsicMirrored, ..row("other", 0, 0.125) };
+    let rows = [row("own", 0, 0.25), other];
+    let panel = |idx: usize| Panel {
+        row: &rows[idx],
+        positions_mm: &embedding.positions_mm,
+        crossings: Vec::new(),
+        is_chosen: idx == 0,
+    };
+    let panels = vec![panel(0), panel(1)];
+    let section = Section { name: None, tree: &tree, view: &views.global, compass: Compass::None, panels };
+    let svg = side_by_side(&[section], &small()).expect("a figure").svg;
+    let is_bold = |value: &str| {
+        let line = svg.lines().find(|line| line.contains(value)).expect("a note");
+        line.contains("font-weight=\"bold\"")
+    };
+    assert_eq!((is_bold("stress 0.250"), is_bold("stress 0.125")), (true, false));
+}
+
+#[test]
 fn trees_of_all_shapes_have_a_figure() {
     let point = Tree::new(&[node(0.0, 0.0, 0.0, 1.0, None)]).expect("a tree");
     let thick =

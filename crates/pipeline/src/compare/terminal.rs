@@ -87,14 +87,16 @@ fn marked(runs: &ComparedRuns, run: &ComparedRun, row: &MethodRow, column: &Show
     let number = |text: &str| text.parse::<f64>().unwrap_or(f64::NAN);
     let own = number(&text);
     let is_rival = |other: &&ComparedRun| other.tree == run.tree && other.targets == run.targets;
-    let mut rivals =
-        runs.0.iter().filter(is_rival).flat_map(|run| &run.rows).filter(|row| row.crossings == 0);
+    // A run may hold a layout that is scored against other targets than the embedding.
+    let kind = run.rows.get(run.chosen).map(|chosen| chosen.targets);
+    let compares = |row: &&MethodRow| row.crossings == 0 && Some(row.targets) == kind;
+    let mut rivals = runs.0.iter().filter(is_rival).flat_map(|run| &run.rows).filter(compares);
     let is_best = match column.better {
         Better::Neither => false,
         Better::Less => rivals.all(|rival| own <= number(&(column.text)(rival))),
         Better::More => rivals.all(|rival| own >= number(&(column.text)(rival))),
     };
-    format!("{text}{}", if is_best && row.crossings == 0 { '*' } else { ' ' })
+    format!("{text}{}", if is_best && compares(&row) { '*' } else { ' ' })
 }
 
 /// Four significant digits; powers of ten where those would be long.
@@ -166,6 +168,16 @@ mod tests {
         assert!(line("> pso").contains("1234.6*") && line("> pso").ends_with("n/a"), "{text}");
         // The numbers of a column end in one place, the mark aside.
         assert_eq!(line("> pso").find("1234.6"), line("> solver").find("1234.6"));
+    }
+
+    #[test]
+    fn a_layout_for_other_targets_is_no_rival() {
+        let other = MethodRow { targets: TargetKind::IntrinsicMirrored, ..row("pso", 0, 0.1) };
+        let runs = ComparedRuns(vec![run("a", "t", vec![other, row("cone", 0, 0.3), row("radial", 0, 0.4)])]);
+        let text = table(&runs, &[&[]]);
+        let line = |method: &str| text.lines().find(|line| line.contains(method)).expect("a line").to_owned();
+        assert!(line("pso").contains("0.100 ") && !line("pso").contains('*'), "{text}");
+        assert!(line("cone").contains("0.300*") && line("radial").contains("0.400 "), "{text}");
     }
 
     #[test]
