@@ -126,6 +126,13 @@ fn what_is_changed_is_found() {
     assert_eq!((error.code(), error.class()), ("E-VERIFY", Class::Uncertified));
     assert!(error.to_string().contains("planar.svg, sha256"), "{error}");
 
+    // A file that the digests pass over.
+    let unsealed = change("SHA256SUMS", false, &|text| {
+        let kept = text.lines().filter(|line| !line.ends_with("  nodes.tsv"));
+        kept.map(|line| format!("{line}\n")).collect()
+    });
+    assert_eq!(failures(unsealed.path()), ["nodes.tsv: sealed"]);
+
     // One coordinate, by ten thousand steps, digest put right.
     let moved = change(embedding, true, &|text| {
         change_number(text, "\"positions_mm\":", 40, |x| {

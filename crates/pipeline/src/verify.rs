@@ -1,8 +1,8 @@
 //! A run folder held against itself: digests, formats, and every number computed again.
 //!
 //! **Input** a run folder that is done with its embed stage. **Output** one check per claim, by file.
-//! **Steps** 1. `SHA256SUMS`: each file in it is there and is what it was. 2. Read what the checks need, as strangers'
-//! files. 3. `espalier_verify` on what was read.
+//! **Steps** 1. `SHA256SUMS`: each file in it is there and is what it was, and what is read below is in it. 2. Read
+//! what the checks need, as strangers' files. 3. `espalier_verify` on what was read.
 //! **Guarantees** nothing is written, nothing is locked, nothing is taken over from the code that made the results.
 
 use std::fs;
@@ -28,6 +28,8 @@ const SUMS: &str = "SHA256SUMS";
 const CONFIG: &str = "provenance/config.resolved.toml";
 const NODES: &str = "nodes.tsv";
 const COMPARE: &str = "compare.tsv";
+/// What the checks read beside those.
+const CHECKED: [Artifact; 4] = [Artifact::Tree, Artifact::Views, Artifact::Embedding, Artifact::Comparison];
 
 /// What became of each claim of a run folder.
 #[derive(Clone, Debug, PartialEq)]
@@ -172,7 +174,7 @@ impl Folder<'_> {
         Error::file(&self.0.join(file), cause)
     }
 
-    /// Every file of `SHA256SUMS`, and the digest of that file itself.
+    /// Every file of `SHA256SUMS`, what ought to be in it, and the digest of that file itself.
     fn check_digests(&self) -> Result<(Vec<(String, Check)>, String), Error> {
         let text = self.text(SUMS)?;
         let mut checks = Vec::new();
@@ -183,6 +185,12 @@ impl Folder<'_> {
             let path = self.0.join(file);
             let (_, found) = file_digest(&path).map_err(|source| Error::Read { path, source })?;
             checks.push((file.to_owned(), Check::same("sha256", digest, found)));
+        }
+        for file in CHECKED.map(|artifact| artifact.file()).into_iter().chain([NODES, COMPARE, CONFIG]) {
+            if !checks.iter().any(|(listed, _)| listed == file) {
+                let fault = Some("no line in SHA256SUMS".to_owned());
+                checks.push((file.to_owned(), Check::unless("sealed", "yes", fault)));
+            }
         }
         Ok((checks, hex_digest(text.as_bytes())))
     }
