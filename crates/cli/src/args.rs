@@ -12,7 +12,7 @@ Examples:
   espalier run scan.nii.gz --set volume.method=region-grow \\
       --set volume.upper=-865 --set 'volume.seed_voxel=[58,80,85]'
   espalier run my.toml --from embed --set embed.w_angle=3    again from a stage on
-  espalier embed out/airway --set embed.pso.freedom=s       one stage of a run folder
+  espalier embed out/airway --set embed.pso.freedom=s   one stage of a run folder
   espalier skeleton mask.nii.gz -o out/skeleton         one stage on files
   espalier compare out/airway                           its methods side by side: table and figure
   espalier verify out/airway                            does everything hold that the folder says?
