@@ -22,7 +22,7 @@ const AIRWAYS: [(u32, f64, f64); 7] = [
     (14, 0.3, 0.25),
     (16, 0.2, 0.12),
 ];
-/// What ALGORITHMS asks for, in seconds, by nodes.
+/// The seconds that a tree may take, by nodes.
 const MUST: [(usize, f64); 5] = [(235, 0.5), (1000, 2.0), (3000, 10.0), (10_000, 60.0), (60_000, 600.0)];
 
 /// Prints the table; whether every result is certified.
