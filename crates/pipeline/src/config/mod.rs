@@ -87,8 +87,8 @@ impl Loaded {
         if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
             return Ok(Self { config: Config::for_input(path, overrides)?, base_dir: PathBuf::new() });
         }
-        let text =
-            std::fs::read_to_string(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
+        let bytes = std::fs::read(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
+        let text = String::from_utf8(bytes).map_err(|_| ConfigError::no_text(path))?;
         let base_dir = path.parent().unwrap_or(Path::new("")).to_owned();
         Ok(Self { config: Config::parse(&text, path, overrides)?, base_dir })
     }
@@ -100,6 +100,12 @@ impl Loaded {
 pub struct ConfigError {
     rendered: String,
     hint: String,
+}
+
+impl ConfigError {
+    fn no_text(path: &Path) -> Box<Self> {
+        Box::new(Self { rendered: format!("{} is not UTF-8 text", path.display()), hint: String::new() })
+    }
 }
 
 impl Diagnose for ConfigError {
