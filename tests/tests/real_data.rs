@@ -77,6 +77,7 @@ fn olfactory_fibre_in_pixels_and_slices() {
     check("neurons/diadem_OP_5.swc", &scale, &Expected { tips: 5..=60, length_mm: 0.1..=3.0 });
 }
 
+/// With little work: `scripts/bench-embed` gives it the whole.
 #[test]
 fn hemibrain_neuron() {
     let voxels = [
@@ -84,6 +85,7 @@ fn hemibrain_neuron() {
         set("input.scale", "[8.0, 8.0, 8.0]"),
         set("embed.pso.particles", 8),
         set("embed.pso.iterations", 1),
+        set("embed.solver.effort", 0.01),
     ];
     check("neurons/hemibrain_722817260.swc", &voxels, &Expected { tips: 300..=3000, length_mm: 0.5..=20.0 });
 }
