@@ -154,7 +154,7 @@ fn never_crosses_never_worse_on_all_families() {
         let mut shape = cone_shape(&problem);
         let before = scored(&problem, &shape);
         let start = shape.positions(&problem);
-        let outcome = relax(&problem, &separation, &mut shape, &mut Work::up_to(5_000_000));
+        let outcome = relax(&problem, &separation, &mut shape, (true, &mut Work::up_to(5_000_000)));
         let (after, positions) = (scored(&problem, &shape), shape.positions(&problem));
         let name = FAMILIES[family];
         assert!(after <= before * (1.0 + 1e-9) + 1e-12, "{name} {key}: {before} {after}");
@@ -189,7 +189,7 @@ fn a_start_that_crosses_stays() {
     let problem = problem(&tree, &Params::default());
     let separation = Separation::new(&problem, 0.05);
     let mut shape = Shape::targets(&problem);
-    relax(&problem, &separation, &mut shape, &mut Work::up_to(u64::MAX));
+    relax(&problem, &separation, &mut shape, (true, &mut Work::up_to(u64::MAX)));
     assert!(shape.angle_ratio.iter().chain(&shape.length_ratio).all(|&r| r == 0.0));
 }
 
@@ -219,7 +219,7 @@ fn pinned_ratios_stay() {
     }
     problem.free_length[1] = false;
     let separation = Separation::new(&problem, 0.05);
-    let outcome = relax(&problem, &separation, &mut shape, &mut Work::up_to(u64::MAX));
+    let outcome = relax(&problem, &separation, &mut shape, (true, &mut Work::up_to(u64::MAX)));
     assert!(outcome.loss_after < outcome.loss_before);
     assert!((1..60).step_by(3).all(|node| shape.angle_ratio[node] == was.angle_ratio[node]));
     assert_eq!(shape.length_ratio[1], was.length_ratio[1]);

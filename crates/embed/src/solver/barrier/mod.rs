@@ -51,18 +51,22 @@ pub(crate) struct Settings {
 /// The runs that follow each other: d̂ in median edge lengths, and μ.
 const CONTINUATION: [(f64, f64); 6] =
     [(3.0, 1e-2), (3.0, 1e-3), (1.0, 1e-2), (1.0, 1e-3), (0.3, 1e-2), (0.3, 1e-3)];
+/// How many of them only the first relaxing of a layout needs.
+const FIRST_ONLY: usize = 3;
 /// The most steps of each.
 const ITERATIONS: usize = 60;
 
-/// Lowers the energy of a layout, first with a wide barrier, then with narrower ones.
+/// Lowers the energy of a layout, first with a wide barrier, then with narrower ones; a layout that has been through
+/// this before needs the wide ones no more.
 pub(crate) fn relax(
     problem: &Problem,
     separation: &Separation,
     shape: &mut Shape,
-    work: &mut Work,
+    (is_first, work): (bool, &mut Work),
 ) -> Outcome {
     let mut whole = Outcome::default();
-    for (idx, (reach, strength)) in CONTINUATION.into_iter().enumerate() {
+    let runs = if is_first { &CONTINUATION[..] } else { &CONTINUATION[FIRST_ONLY..] };
+    for (idx, &(reach, strength)) in runs.iter().enumerate() {
         let settings = Settings { reach_mm: reach * problem.scale_mm, strength, iterations: ITERATIONS };
         let part = minimise(problem, separation, shape, (&settings, work));
         if idx == 0 {

@@ -30,8 +30,8 @@ pub(super) struct Phase {
 /// A walk over sides.
 #[derive(Clone)]
 pub(super) struct Walker<'s> {
-    state: State<'s>,
-    mover: Mover,
+    pub(super) state: State<'s>,
+    pub(super) mover: Mover,
     judge: Prices,
     pub(super) best: Saved,
     pub(super) best_terms: Terms,
@@ -67,15 +67,8 @@ impl<'s> Walker<'s> {
     pub(super) fn anneal(&mut self, phase: &Phase, mut stream: Stream) {
         self.state.restore(&self.best);
         let (mut step, mut best_is_here) = (Step::default(), false);
-        let (n_before, n_visits_before) = (self.n_evaluations, self.n_visits());
-        loop {
-            let share_evaluated = (self.n_evaluations - n_before) as f64 / phase.n_evaluations;
-            let n_visits = (self.n_visits() - n_visits_before) as f64;
-            let share = share_evaluated.max(n_visits / (phase.n_evaluations * VISITS_PER_EVALUATION));
-            if share >= 1.0 {
-                break;
-            }
-            let temperature = phase.hottest * math::pow(phase.coldest / phase.hottest, share);
+        let begun = (self.n_evaluations, self.n_visits());
+        while let Some(temperature) = self.temperature(phase, begun) {
             for _ in 0..STRIDE {
                 self.try_step((&mut step, &mut best_is_here), (&phase.prices, temperature), &mut stream);
             }
@@ -83,6 +76,14 @@ impl<'s> Walker<'s> {
         if best_is_here {
             self.best = self.state.save();
         }
+    }
+
+    /// The temperature of a phase that began at given counts of evaluations and visits; none when it is over.
+    pub(super) fn temperature(&self, phase: &Phase, (n_before, n_visits_before): (u64, u64)) -> Option<f64> {
+        let share_evaluated = (self.n_evaluations - n_before) as f64 / phase.n_evaluations;
+        let n_visits = (self.n_visits() - n_visits_before) as f64;
+        let share = share_evaluated.max(n_visits / (phase.n_evaluations * VISITS_PER_EVALUATION));
+        (share < 1.0).then(|| phase.hottest * math::pow(phase.coldest / phase.hottest, share))
     }
 
     /// One evaluation. The best state is saved only when it is left, for better ones follow each other.

@@ -7,6 +7,7 @@
 //! | `state` | the layout, what a move would change, and taking it |
 //! | `moves` | which turns change sides together |
 //! | `anneal` | the walk |
+//! | `settle` | the last walk, for distances |
 //!
 //! **Input** the problem with the targets of its local planes. **Output** targets with sides that were chosen, and
 //! what is left when they are drawn as they are.
@@ -16,7 +17,7 @@
 //! against the targets given, each as dear as the smaller of its two bends.
 //! **Steps** 1. Simulated annealing at full prices. 2. While something crosses, again from the best state, with all
 //! prices but that of crossings lowered. 3. Polish: annealing from a low temperature, where headings count twice, with
-//! the evaluations that are left. Two walks with different random numbers run side by side and are compared at the end
+//! the evaluations that are left. 4. Settling: distances between nodes as in space. Two walks with different random numbers run side by side and are compared at the end
 //! of each round; the polish goes on from the better one.
 //! **Guarantees** sizes of bends stay, up to the distance that siblings keep. Without a crossing at the start
 //! nothing changes. Never more crossings than at the start.
@@ -36,6 +37,7 @@ mod isometry;
 mod moves;
 mod rectangle;
 mod setting;
+mod settle;
 mod state;
 
 use std::f64::consts::PI;
@@ -52,6 +54,7 @@ use crate::problem::Problem;
 use crate::siblings;
 use anneal::{Phase, Walker};
 use setting::Setting;
+use settle::Distances;
 pub(crate) use state::Terms;
 use state::{Prices, State};
 
@@ -72,6 +75,9 @@ const ROUND_SHARE: f64 = 0.2;
 /// The polish: temperatures, and the share of the evaluations that it has at most; it has what the rounds leave.
 const POLISH_TEMPERATURES: (f64, f64) = (0.2, 0.01);
 const POLISH_SHARE: f64 = 0.5;
+/// The settling: temperatures, and its evaluations as a share of those of the search.
+const SETTLING_TEMPERATURES: (f64, f64) = (0.3, 0.01);
+const SETTLING_SHARE: f64 = 0.15;
 /// Full prices, against 1 for a crossing; that of the placement is times M, that of zigzags is per rad.
 const PLACEMENT_PRICE: f64 = 0.05;
 const SIBLINGS_PRICE: f64 = 1.0;
@@ -148,7 +154,8 @@ pub(crate) fn search(problem: &Problem, params: &SolverParams, seed: u64) -> Mir
         };
     }
 
-    let judge = Prices { placement: 2.0 * prices(problem, 1.0).placement, ..prices(problem, 1.0) };
+    let full = prices(problem, 1.0);
+    let judge = Prices { placement: 2.0 * full.placement, ..full };
     let mut walkers = vec![Walker::new(state, judge); N_WALKS];
     let n_evaluations = params.effort * EVALUATIONS * math::pow(problem.n_nodes() as f64, EVALUATIONS_POWER);
     let mut share_left = 1.0;
@@ -173,6 +180,13 @@ pub(crate) fn search(problem: &Problem, params: &SolverParams, seed: u64) -> Mir
         n_evaluations: n_evaluations * share_left.min(POLISH_SHARE),
     };
     run_side_by_side(&mut walkers, &polish, (seed, ROUNDS.len() as u32));
+    let settling = Phase {
+        hottest: SETTLING_TEMPERATURES.0,
+        coldest: SETTLING_TEMPERATURES.1,
+        prices: full,
+        n_evaluations: n_evaluations * SETTLING_SHARE,
+    };
+    settle_side_by_side(&mut walkers, &settling, seed);
     finish(problem, walkers, terms_at_start)
 }
 
@@ -208,6 +222,22 @@ fn run_side_by_side(walkers: &mut [Walker], phase: &Phase, (seed, round): (u64, 
     });
 }
 
+/// The last walk of each; the one of the least cost comes first.
+fn settle_side_by_side(walkers: &mut [Walker], phase: &Phase, seed: u64) {
+    let distances = Distances::new(walkers[0].state.setting);
+    let settled = |(walk, walker): (usize, &mut Walker)| {
+        let stream = Stream::new(seed, Purpose::MirrorSearch, walk as u32, ROUNDS.len() as u32 + 1);
+        walker.settle(&distances, phase, stream)
+    };
+    let costs: Vec<f64> = walkers.par_iter_mut().enumerate().map(settled).collect();
+    let order = |&a: &usize, &b: &usize| {
+        let n_crossings = |walk: usize| walkers[walk].best_terms.crossings;
+        n_crossings(a).cmp(&n_crossings(b)).then(costs[a].total_cmp(&costs[b]))
+    };
+    let best = (0..walkers.len()).min_by(order).unwrap_or(0);
+    walkers.swap(0, best);
+}
+
 /// All walks go on from the best one.
 fn take_best(walkers: &mut [Walker]) {
     let mut best = 0;
@@ -223,7 +253,6 @@ fn take_best(walkers: &mut [Walker]) {
 }
 
 fn finish(problem: &Problem, mut walkers: Vec<Walker>, terms_at_start: Terms) -> Mirrored {
-    take_best(&mut walkers);
     let (turns, n_zigzags) = walkers[0].best_turns();
     let mut targets = problem.targets.clone();
     targets.kind = targets.kind.mirrored();

@@ -63,7 +63,7 @@ impl Step {
     }
 
     /// The part of an edge.
-    fn part_of(&self, edge: usize) -> usize {
+    pub(super) fn part_of(&self, edge: usize) -> usize {
         self.parts.iter().position(|part| part.range.contains(&edge)).map_or(0, |idx| idx + 1)
     }
 
@@ -221,6 +221,11 @@ impl<'s> State<'s> {
             parent => self.direction[parent],
         };
         (self.hierarchy.ends[node].0, direction)
+    }
+
+    /// Where a node lies.
+    pub(super) fn position(&self, node: usize) -> DVec2 {
+        self.hierarchy.ends[node].1
     }
 
     /// Where an edge ends, and its direction.
