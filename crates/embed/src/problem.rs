@@ -136,6 +136,16 @@ impl<'a> Problem<'a> {
         self.parent.len()
     }
 
+    /// The size of the problem for budgets: N, but of long chains with few forks only what their branches deserve.
+    pub(crate) fn n_joints(&self) -> usize {
+        self.n_nodes().min(500 + 20 * self.branches.list().len())
+    }
+
+    /// Whether the tree is next to all chain: its turns are too many for its budgets to look at each.
+    pub(crate) fn is_thread(&self) -> bool {
+        self.n_nodes() > 20 * self.n_joints()
+    }
+
     /// The number of tips below each node, itself if it is one.
     pub(crate) fn n_tips_below(&self) -> Vec<u32> {
         let mut n_tips = vec![0_u32; self.n_nodes()];

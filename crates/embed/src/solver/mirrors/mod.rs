@@ -58,7 +58,8 @@ use settle::Distances;
 pub(crate) use state::Terms;
 use state::{Prices, State};
 
-/// The evaluations of one walk are this much at most, times N to the power below: 70,000 for 235 nodes, 200,000 for
+/// The evaluations of one walk are this much at most, times N (but no more than `Problem::n_joints`) to the power
+/// below: 70,000 for 235 nodes, 200,000 for
 /// 1000, 3 million for 60,000, where one takes 1, 4 and 20 µs.
 const EVALUATIONS: f64 = 1800.0;
 const EVALUATIONS_POWER: f64 = 0.68;
@@ -84,6 +85,8 @@ const SIBLINGS_PRICE: f64 = 1.0;
 const ZIGZAG_PRICE: f64 = 0.3;
 /// The price of a pair of edges that are too near, in all rounds.
 const NEAR_PRICE: f64 = 0.25;
+/// The same in the polish, where nothing crosses that they could stand in the way of.
+const POLISH_NEAR_PRICE: f64 = 1.0;
 /// The price of an edge that enters the space behind the root.
 const KEEP_OUT_PRICE: f64 = 1.0;
 /// Walks side by side.
@@ -111,7 +114,7 @@ pub(crate) fn mirrored<'t>(
 ) -> (Option<Problem<'t>>, Report) {
     let mut report = Report::default();
     let wants_solver = params.method == Method::Solver || params.methods.contains(&Method::Solver);
-    if !(wants_solver && params.solver.mirrors) {
+    if !(wants_solver && params.solver.mirrors) || problem.is_thread() {
         return (None, report);
     }
     let found = search(problem, &params.solver, seed);
@@ -155,9 +158,9 @@ pub(crate) fn search(problem: &Problem, params: &SolverParams, seed: u64) -> Mir
     }
 
     let full = prices(problem, 1.0);
-    let judge = Prices { placement: 2.0 * full.placement, ..full };
+    let judge = Prices { near: POLISH_NEAR_PRICE, placement: 2.0 * full.placement, ..full };
     let mut walkers = vec![Walker::new(state, judge); N_WALKS];
-    let n_evaluations = params.effort * EVALUATIONS * math::pow(problem.n_nodes() as f64, EVALUATIONS_POWER);
+    let n_evaluations = params.effort * EVALUATIONS * math::pow(problem.n_joints() as f64, EVALUATIONS_POWER);
     let mut share_left = 1.0;
     for (round, share) in (0..).zip(ROUNDS) {
         let phase = Phase {
@@ -183,7 +186,7 @@ pub(crate) fn search(problem: &Problem, params: &SolverParams, seed: u64) -> Mir
     let settling = Phase {
         hottest: SETTLING_TEMPERATURES.0,
         coldest: SETTLING_TEMPERATURES.1,
-        prices: full,
+        prices: Prices { near: POLISH_NEAR_PRICE, ..full },
         n_evaluations: n_evaluations * SETTLING_SHARE,
     };
     settle_side_by_side(&mut walkers, &settling, seed);
