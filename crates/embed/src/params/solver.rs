@@ -26,7 +26,8 @@ pub struct SolverParams {
     pub clearance: f64,
     /// Whether branches are kept from curling back beside the root's branch, as the exact bends of a bronchial tree
     /// would make them do: the search for sides prices what enters the third of the plane behind the root. Default
-    /// `auto`: where the tree has a trunk, since a tree that leaves its root in all directions has no behind.
+    /// `auto`: where the tree has a trunk, since a tree that leaves its root in all directions has no behind, and
+    /// only when something crosses; `on` searches for this alone too.
     pub root_keep_out: KeepOut,
 }
 

@@ -20,7 +20,7 @@
 //! the evaluations that are left. 4. Settling: distances between nodes as in space. Two walks with different random numbers run side by side and are compared at the end
 //! of each round; the polish goes on from the better one.
 //! **Guarantees** sizes of bends stay, up to the distance that siblings keep. Without a crossing at the start
-//! nothing changes. Never more crossings than at the start.
+//! nothing changes, but under `root_keep_out = "on"` where an edge is behind the root. Never more crossings than at the start.
 //! **Differs from the prototype** it mirrored whole local planes first, which finds nothing that single turns do not.
 //! Why not a swarm over the mirror bits? Of seven neurons of 135 to 300 nodes whose planes cross, a binary swarm with one
 //! bit per plane ended without a crossing on three, and with 1, 1, 2 and 4 on the others, after 123,000 evaluations;
@@ -102,7 +102,7 @@ pub(crate) struct Mirrored {
     /// Changes of sides inside segments that the given targets did not have.
     pub(crate) n_zigzags: usize,
     pub(crate) evaluations: u64,
-    /// Pairs of circles looked at: the work.
+    /// Pairs of blocks looked at: the work.
     pub(crate) visits: u64,
 }
 
