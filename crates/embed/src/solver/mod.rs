@@ -51,9 +51,10 @@ pub(crate) use repair::repair;
 pub(crate) use shape::Shape;
 pub(crate) use work::Work;
 
-/// Units of work that a start may take, for each edge (but see `Problem::n_joints`), and in all.
+/// Units of work that a start may take, for each edge (but see `Problem::n_joints`), and in all: 6 billion take two to
+/// three minutes; with a quarter of them a neuron of 50,000 nodes ends at 27° instead of 2°.
 const WORK_PER_EDGE: u64 = 150_000;
-const MOST_WORK: u64 = 1_500_000_000;
+const MOST_WORK: u64 = 6_000_000_000;
 /// What untangling may take of the work; a hemibrain neuron of 4332 nodes with two crossings left needs more than a
 /// quarter of it.
 const UNTANGLING_SHARE: f64 = 0.6;
