@@ -8,13 +8,12 @@
 //! Times are those of a run with the search less those of one without.
 #![allow(clippy::print_stdout, clippy::disallowed_methods, reason = "an example that measures")]
 
+mod trees;
+
 use std::error::Error;
 use std::time::Instant;
 
 use espalier_embed::{KeepOut, Method, Params, SolverParams, embed};
-use espalier_model::swc::{SwcScale, parse};
-use espalier_model::{Node, Tree};
-use espalier_phantom::Kind;
 use espalier_views::find_views;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -39,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn measure(word: &str, params: &Params, seed: u64) -> Result<(), Box<dyn Error>> {
     let (source, grown) = word.split_once('@').unwrap_or((word, "0"));
     let name = source.rsplit('/').next().unwrap_or(source);
-    let Ok(tree) = tree(source, grown.parse()?) else {
+    let Ok(tree) = trees::tree(source, grown.parse()?) else {
         println!("{name}: not a tree");
         return Ok(());
     };
@@ -71,53 +70,4 @@ fn measure(word: &str, params: &Params, seed: u64) -> Result<(), Box<dyn Error>>
         1e6 * seconds / evaluations.max(1.0),
     );
     Ok(())
-}
-
-fn tree(name: &str, seed: u64) -> Result<Tree, Box<dyn Error>> {
-    let kind = match name {
-        "neuron" => Kind::Neuron,
-        "airway" => Kind::Airway,
-        "vessel" => Kind::Vessel,
-        path => return swc_tree(&std::fs::read(path)?),
-    };
-    Ok(espalier_phantom::grow_tree(kind, &espalier_phantom::Params::default(), seed)?)
-}
-
-/// The first root's tree of a file, without nodes that lie on their parents.
-fn swc_tree(bytes: &[u8]) -> Result<Tree, Box<dyn Error>> {
-    let (traced, _) = parse(bytes, &SwcScale::micrometres())?;
-    let order = parents_first(&traced.nodes.iter().map(|node| node.parent).collect::<Vec<_>>());
-    let (mut nodes, mut place): (Vec<Node>, Vec<Option<usize>>) =
-        (Vec::new(), vec![None; traced.nodes.len()]);
-    for node_idx in order {
-        let node = &traced.nodes[node_idx];
-        let parent = node.parent.and_then(|parent| place[parent]);
-        if let Some(same) = parent.filter(|&parent| nodes[parent].position_mm == node.position_mm) {
-            place[node_idx] = Some(same);
-        } else if parent.is_some() || nodes.is_empty() {
-            place[node_idx] = Some(nodes.len());
-            let (position_mm, radius_mm) = (node.position_mm, node.radius_mm);
-            nodes.push(Node { position_mm, radius_mm, parent, kind: node.kind });
-        }
-    }
-    Ok(Tree::new(&nodes)?)
-}
-
-/// Indices with every parent before its children.
-fn parents_first(parents: &[Option<usize>]) -> Vec<usize> {
-    let mut children = vec![Vec::new(); parents.len()];
-    for (node, parent) in parents.iter().enumerate() {
-        if let Some(parent) = *parent {
-            children[parent].push(node);
-        }
-    }
-    let mut order: Vec<usize> = (0..parents.len()).filter(|&node| parents[node].is_none()).collect();
-    order.truncate(1);
-    let mut idx = 0;
-    while idx < order.len() {
-        let node = order[idx];
-        order.extend_from_slice(&children[node]);
-        idx += 1;
-    }
-    order
 }
