@@ -101,7 +101,7 @@ fn truncated_gzip() {
         &folder,
         &["run", "cut.nii.gz"],
         3,
-        &["cut.nii.gz", "error[E-NIFTI-TRUNCATED]", "nothing was written"],
+        &["cut.nii.gz", "error[E-VOLUME-TRUNCATED]", "nothing was written"],
     );
 }
 

@@ -45,7 +45,7 @@ impl Class {
 
 /// An error that names its code, its class and the way out. Its `Display` names the place and the cause.
 pub trait Diagnose: std::error::Error {
-    /// A short stable code such as `E-NIFTI-TRUNCATED`.
+    /// A short stable code such as `E-VOLUME-TRUNCATED`.
     fn code(&self) -> &'static str;
     /// The class, hence the exit code.
     fn class(&self) -> Class;

@@ -12,7 +12,7 @@ pub struct Count {
 /// Something the reader should know although the stage went on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Warning {
-    /// A short stable code such as `W-NIFTI-NO-UNITS`.
+    /// A short stable code such as `W-VOLUME-NO-UNITS`.
     pub code: &'static str,
     /// The place and the fact, lower case, no full stop.
     pub message: String,

@@ -3,9 +3,9 @@
 //! | step | file |
 //! |---|---|
 //! | bytes of a file, decompressed and bounded | `source` |
-//! | the 348 bytes of the header, checked | `nifti/header` |
-//! | voxel axes in the world: the affine ladder | `nifti/affine` |
-//! | stored numbers of any type and byte order | `nifti/voxels` |
+//! | what all formats come to: header read, voxels still in the file | `stored`, `scalar` |
+//! | NIfTI-1: the 348 bytes of the header, checked; the affine ladder | `nifti/header`, `nifti/affine` |
+//! | stored numbers of any type and byte order | `decode` |
 //! | sheared axes to orthogonal ones | `orthogonal` |
 //! | **[`read`]**: file → [`Volume`](espalier_model::Volume) | `read` |
 //! | what a volume is: mask, labels, CT | `kind` |
@@ -20,10 +20,13 @@
 //! **Architecture Invariant:** this is the only stage that reads files, and it writes none. No byte of a file
 //! makes it panic, recurse, or hold more than the limit that the caller states.
 
+mod scalar;
 mod source;
+mod stored;
 
 mod nifti;
 
+mod decode;
 mod orthogonal;
 mod read;
 

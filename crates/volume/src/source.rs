@@ -22,7 +22,7 @@ const MAX_DAMAGE_BYTES: u64 = 64 << 20;
 
 /// A stream of decompressed bytes.
 pub(crate) struct Source {
-    reader: Box<dyn Read>,
+    reader: Box<dyn Read + Send>,
     is_compressed: bool,
     /// The most bytes that can come.
     max_bytes: u64,
@@ -45,7 +45,7 @@ impl Source {
             return Err(ReadError::Empty);
         }
         let is_compressed = start.starts_with(&[0x1F, 0x8B]);
-        let (reader, max_bytes): (Box<dyn Read>, u64) = if is_compressed {
+        let (reader, max_bytes): (Box<dyn Read + Send>, u64) = if is_compressed {
             (Box::new(MultiGzDecoder::new(file)), metadata.len().saturating_mul(MAX_RATIO))
         } else {
             (Box::new(file), metadata.len())

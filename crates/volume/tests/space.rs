@@ -121,7 +121,7 @@ fn the_ladder() {
     }
 
     // Neither: an error, or what the caller assumes.
-    assert_eq!(Made::new().outcome(&options), error("E-NIFTI-NO-SPACE"));
+    assert_eq!(Made::new().outcome(&options), error("E-VOLUME-NO-SPACE"));
     let hint = Made::new().read(&options).expect_err("no space").hint();
     assert!(hint.contains("--set input.assume_space=ras"), "{hint}");
     for (space, letters) in
@@ -137,16 +137,16 @@ fn the_ladder() {
 
     // Numbers that are no place.
     for bad in [f32::NAN, f32::INFINITY] {
-        assert_eq!(Made::new().sform(SFORM).f32(284, &[bad]).outcome(&options), error("E-NIFTI-FORM"));
-        assert_eq!(Made::new().qform([0.0, bad, 0.0], [0.0; 3]).outcome(&options), error("E-NIFTI-FORM"));
+        assert_eq!(Made::new().sform(SFORM).f32(284, &[bad]).outcome(&options), error("E-VOLUME-FORM"));
+        assert_eq!(Made::new().qform([0.0, bad, 0.0], [0.0; 3]).outcome(&options), error("E-VOLUME-FORM"));
     }
-    assert_eq!(Made::new().sform([SFORM[0], SFORM[0], SFORM[2]]).outcome(&options), error("E-NIFTI-FORM"));
+    assert_eq!(Made::new().sform([SFORM[0], SFORM[0], SFORM[2]]).outcome(&options), error("E-VOLUME-FORM"));
     for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         assert_eq!(
             Made::new().qform(quarter, [0.0; 3]).f32(80, &[bad]).outcome(&options),
-            error("E-NIFTI-FORM")
+            error("E-VOLUME-FORM")
         );
-        assert_eq!(Made::new().f32(80, &[bad]).outcome(&options), error("E-NIFTI-FORM"));
+        assert_eq!(Made::new().f32(80, &[bad]).outcome(&options), error("E-VOLUME-FORM"));
         // The sform places the volume; pixdim is only reported.
         assert_eq!(Made::new().sform(SFORM).f32(80, &[bad]).outcome(&options), ok(&LPS, "W-NIFTI-PIXDIM"));
     }
@@ -213,7 +213,7 @@ fn four_dimensions() {
     let third = made.read(&with(Some(3))).expect("the third").volume;
     assert_eq!((third.value(0), third.value(11)), (36.0, 47.0));
     let error = made.read(&with(Some(5))).expect_err("there are five");
-    assert_eq!((error.code(), error.class().exit_code()), ("E-NIFTI-VOLUME-INDEX", 2));
+    assert_eq!((error.code(), error.class().exit_code()), ("E-VOLUME-VOLUME-INDEX", 2));
 }
 
 #[test]
@@ -223,7 +223,7 @@ fn shear_is_resampled_or_refused() {
     let mut made = Made::new();
     made.sform(tilt);
     let strict = ReadOptions { strict: true, ..ReadOptions::default() };
-    assert_eq!(made.outcome(&strict).1, "E-NIFTI-SHEAR");
+    assert_eq!(made.outcome(&strict).1, "E-VOLUME-SHEAR");
     let hint = made.read(&strict).expect_err("sheared").hint();
     assert!(hint.contains("--set input.strict=false"), "{hint}");
     let loaded = made.read(&ReadOptions::default()).expect("resampled");

@@ -50,7 +50,7 @@ pub(crate) fn world_from_voxel(
         Some(AssumedSpace::Las) => DVec3::new(-1.0, 1.0, 1.0),
         Some(AssumedSpace::Lps) => DVec3::new(-1.0, -1.0, 1.0),
     };
-    report.warn("W-NIFTI-ASSUMED-SPACE", "neither sform nor qform is set: the axes are as assumed");
+    report.warn("W-VOLUME-ASSUMED-SPACE", "neither sform nor qform is set: the axes are as assumed");
     Ok((DAffine3::from_mat3(DMat3::from_diagonal(spacing_mm * signs)), "pixdim"))
 }
 

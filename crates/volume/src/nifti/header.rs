@@ -11,65 +11,12 @@ use espalier_model::Report;
 use nifti::NiftiHeader;
 
 use crate::ReadError;
+use crate::scalar::Scalar;
 
 pub(crate) const N_HEADER_BYTES: usize = 348;
 const MIN_OFFSET: u64 = 352;
 /// Whole numbers are exact in the single precision of `vox_offset` up to here; no header is as long.
 const MAX_OFFSET: f32 = 16_777_216.0;
-
-/// The types of stored numbers that are read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Scalar {
-    U8,
-    I8,
-    I16,
-    U16,
-    I32,
-    U32,
-    I64,
-    U64,
-    F32,
-    F64,
-}
-
-impl Scalar {
-    fn from_code(code: i16) -> Result<Self, ReadError> {
-        let what = match code {
-            2 => return Ok(Self::U8),
-            4 => return Ok(Self::I16),
-            8 => return Ok(Self::I32),
-            16 => return Ok(Self::F32),
-            64 => return Ok(Self::F64),
-            256 => return Ok(Self::I8),
-            512 => return Ok(Self::U16),
-            768 => return Ok(Self::U32),
-            1024 => return Ok(Self::I64),
-            1280 => return Ok(Self::U64),
-            1 => "single bits",
-            32 | 1792 | 2048 => "complex numbers",
-            128 => "RGB colours",
-            2304 => "RGBA colours",
-            1536 => "128-bit floats",
-            _ => "of a type that the standard does not know",
-        };
-        Err(ReadError::NotScalar { what, code })
-    }
-
-    /// Bytes for one number in the file.
-    pub(crate) fn file_bytes(self) -> u64 {
-        match self {
-            Self::U8 | Self::I8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::I64 | Self::U64 | Self::F64 => 8,
-        }
-    }
-
-    /// Bytes for one number in memory: signed bytes are widened to 16 bits.
-    pub(crate) fn memory_bytes(self) -> u64 {
-        if self == Self::I8 { 2 } else { self.file_bytes() }
-    }
-}
 
 /// What a header says, checked.
 pub(crate) struct Header {
@@ -112,7 +59,7 @@ pub(crate) fn parse(bytes: &[u8; N_HEADER_BYTES], report: &mut Report) -> Result
         return Err(ReadError::Field { field, found: found.to_string(), expected });
     }
     let (shape, n_volumes) = extents(&fields.dim, n_dims)?;
-    let scalar = Scalar::from_code(fields.datatype)?;
+    let scalar = scalar(fields.datatype)?;
     if u64::try_from(fields.bitpix) != Ok(8 * scalar.file_bytes()) {
         let (bitpix, bits) = (fields.bitpix, 8 * scalar.file_bytes());
         report.warn(
@@ -163,6 +110,29 @@ fn recognise(bytes: &[u8; N_HEADER_BYTES]) -> Result<bool, ReadError> {
             way_out: "give a .nii or .nii.gz file, or convert the volume to one",
         }),
     }
+}
+
+/// The type of the numbers by `datatype`.
+fn scalar(code: i16) -> Result<Scalar, ReadError> {
+    let what = match code {
+        2 => return Ok(Scalar::U8),
+        4 => return Ok(Scalar::I16),
+        8 => return Ok(Scalar::I32),
+        16 => return Ok(Scalar::F32),
+        64 => return Ok(Scalar::F64),
+        256 => return Ok(Scalar::I8),
+        512 => return Ok(Scalar::U16),
+        768 => return Ok(Scalar::U32),
+        1024 => return Ok(Scalar::I64),
+        1280 => return Ok(Scalar::U64),
+        1 => "single bits",
+        32 | 1792 | 2048 => "complex numbers",
+        128 => "RGB colours",
+        2304 => "RGBA colours",
+        1536 => "128-bit floats",
+        _ => "of a type that the standard does not know",
+    };
+    Err(ReadError::NotScalar { what, code })
 }
 
 /// Voxels along x, y, z, and the number of volumes over all further dimensions.
