@@ -31,9 +31,8 @@ fn tubes_cut_lengthwise() {
             let radius = 2.0 * spacing.max_element();
             let axis = DVec3::new(0.0, share * radius, 12.0 * spacing.z);
             let inside = |p: DVec3| (p - axis).with_x(0.0).length() <= radius;
-            let voxel_mm = |index| DVec3::from_array(grid.voxel(index).map(|c| c as f64)) * spacing;
             let mask =
-                Mask::new(grid.clone(), (0..grid.n_voxels()).map(|index| inside(voxel_mm(index))).collect());
+                Mask::from_fn(grid, |voxel| inside(DVec3::from_array(voxel.map(|c| c as f64)) * spacing));
             let length_mm = grow(&mask).length_mm();
             assert!(length_mm >= 89.0 * spacing.x - 2.0 * radius, "{spacing} {share}: {length_mm} mm");
         }
@@ -51,6 +50,6 @@ fn masks_of_no_shape() {
         let density = stream.uniform(0.2, 1.0);
         let mut voxels: Vec<bool> = (0..grid.n_voxels()).map(|_| stream.unit() < density).collect();
         voxels[0] = true;
-        assert!(grow(&Mask::new(grid, voxels)).n_nodes() >= 1);
+        assert!(grow(&Mask::from_voxels(grid, &voxels)).n_nodes() >= 1);
     }
 }

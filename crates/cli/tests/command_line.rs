@@ -60,7 +60,7 @@ fn listing(folder: &Path) -> Vec<String> {
 fn uniform_volume(value: bool) -> Vec<u8> {
     let grid =
         espalier_model::Grid::axis_aligned([8, 8, 8], glam::DVec3::ONE, glam::DVec3::ZERO).expect("grid");
-    espalier_model::nifti_out::mask(&espalier_model::Mask::new(grid, vec![value; 512])).expect("bytes")
+    espalier_model::nifti_out::mask(&espalier_model::Mask::from_voxels(grid, &[value; 512])).expect("bytes")
 }
 
 #[test]

@@ -19,6 +19,7 @@
 //!
 //! **Architecture Invariant:** no algorithms here, and no file access: files are bytes in and bytes out.
 
+mod bits;
 pub mod diagnose;
 mod digest;
 mod edits;
@@ -37,6 +38,7 @@ mod versioned;
 mod views;
 mod volume;
 
+pub use bits::Bits;
 pub use diagnose::Diagnose;
 pub use edits::{Edit, EditError, Edits};
 pub use embedding::{

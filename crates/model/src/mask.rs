@@ -1,37 +1,61 @@
 //! A binary volume: the organ.
 
-use ndarray::{Array3, ArrayView3};
+use crate::{Bits, Grid};
 
-use crate::Grid;
-
-/// A binary volume: `true` is foreground.
+/// A binary volume: 1 is foreground.
 ///
-/// **Guarantees** the array has the grid's shape (nz, ny, nx), in standard layout, x fastest.
+/// **Guarantees** the bits have the grid's shape.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mask {
     grid: Grid,
-    voxels: Array3<bool>,
+    bits: Bits,
 }
 
 impl Mask {
-    /// A mask from a flat vector, x fastest.
+    /// A mask of bits on a grid.
     ///
     /// # Panics
-    /// If the vector's length is not the grid's number of voxels: a mistake of the caller's code.
+    /// If the shapes differ: a mistake of the caller's code.
     #[must_use]
-    pub fn new(grid: Grid, voxels: Vec<bool>) -> Self {
-        let [nx, ny, nz] = grid.shape();
+    pub fn new(grid: Grid, bits: Bits) -> Self {
+        assert_eq!(bits.shape(), grid.shape(), "mask does not match its grid");
+        Self { grid, bits }
+    }
+
+    /// A mask from one `bool` a voxel, x fastest.
+    ///
+    /// # Panics
+    /// If their number is not the grid's: a mistake of the caller's code.
+    #[must_use]
+    pub fn from_voxels(grid: Grid, voxels: &[bool]) -> Self {
         assert_eq!(voxels.len(), grid.n_voxels(), "mask does not match its grid");
-        // The length was just checked, so the shape fits.
-        let voxels = Array3::from_shape_vec((nz, ny, nx), voxels).unwrap_or_default();
-        Self { grid, voxels }
+        let mut bits = Bits::new(grid.shape());
+        for (row, values) in voxels.chunks_exact(grid.shape()[0]).enumerate() {
+            for (word, values) in bits.row_mut(row).iter_mut().zip(values.chunks(u64::BITS as usize)) {
+                *word = values.iter().rev().fold(0, |word, &value| word << 1 | u64::from(value));
+            }
+        }
+        Self { grid, bits }
+    }
+
+    /// The mask of the voxels (x, y, z) that `is_inside` says are foreground.
+    #[must_use]
+    pub fn from_fn(grid: Grid, is_inside: impl Fn([usize; 3]) -> bool) -> Self {
+        let [nx, ny, _] = grid.shape();
+        let mut bits = Bits::new(grid.shape());
+        for row in 0..bits.n_rows() {
+            for x in (0..nx).filter(|&x| is_inside([x, row % ny, row / ny])) {
+                bits.set([x, row % ny, row / ny]);
+            }
+        }
+        Self { grid, bits }
     }
 
     /// A mask without foreground.
     #[must_use]
     pub fn empty(grid: Grid) -> Self {
-        let n_voxels = grid.n_voxels();
-        Self::new(grid, vec![false; n_voxels])
+        let bits = Bits::new(grid.shape());
+        Self { grid, bits }
     }
 
     /// The grid.
@@ -40,53 +64,55 @@ impl Mask {
         &self.grid
     }
 
-    /// The voxels as an array of shape (nz, ny, nx).
+    /// The bits.
     #[must_use]
-    pub fn view(&self) -> ArrayView3<'_, bool> {
-        self.voxels.view()
+    pub fn bits(&self) -> &Bits {
+        &self.bits
     }
 
-    /// The voxels as a flat slice, x fastest.
+    /// The bits, to be written.
     #[must_use]
-    pub fn as_slice(&self) -> &[bool] {
-        self.voxels.as_slice().unwrap_or_default()
+    pub fn bits_mut(&mut self) -> &mut Bits {
+        &mut self.bits
     }
 
-    /// The voxels as a flat mutable slice, x fastest.
+    /// The bits, taken out.
     #[must_use]
-    pub fn as_mut_slice(&mut self) -> &mut [bool] {
-        self.voxels.as_slice_mut().unwrap_or_default()
+    pub fn into_bits(self) -> Bits {
+        self.bits
+    }
+
+    /// One `bool` a voxel, x fastest: eight times the memory of the bits.
+    #[must_use]
+    pub fn to_voxels(&self) -> Vec<bool> {
+        let nx = self.grid.shape()[0];
+        let row = |row: usize| {
+            let words = self.bits.row(row);
+            (0..nx).map(move |x| words[x / 64] >> (x % 64) & 1 != 0)
+        };
+        (0..self.bits.n_rows()).flat_map(row).collect()
     }
 
     /// Whether a voxel is foreground; outside the grid there is none.
     #[must_use]
-    pub fn contains(&self, [x, y, z]: [i64; 3]) -> bool {
-        let [nx, ny, nz] = self.grid.shape().map(|extent| extent as i64);
-        (0..nx).contains(&x)
-            && (0..ny).contains(&y)
-            && (0..nz).contains(&z)
-            && self.voxels[[z as usize, y as usize, x as usize]]
+    pub fn contains(&self, voxel: [i64; 3]) -> bool {
+        self.bits.contains(voxel)
+    }
+
+    /// The foreground voxels, in storage order.
+    pub fn voxels(&self) -> impl Iterator<Item = [usize; 3]> + '_ {
+        self.bits.voxels()
     }
 
     /// The number of foreground voxels.
     #[must_use]
     pub fn n_foreground(&self) -> usize {
-        self.as_slice().iter().filter(|&&v| v).count()
+        self.bits.count()
     }
 
     /// The smallest box that holds the foreground, as first and last voxel (inclusive); `None` if there is none.
     #[must_use]
     pub fn bounding_box(&self) -> Option<([usize; 3], [usize; 3])> {
-        let [nx, ny, _] = self.grid.shape();
-        let mut bounds: Option<([usize; 3], [usize; 3])> = None;
-        for (row_idx, row) in self.as_slice().chunks_exact(nx).enumerate() {
-            let Some(first) = row.iter().position(|&v| v) else { continue };
-            let last = row.iter().rposition(|&v| v).unwrap_or(first);
-            let (y, z) = (row_idx % ny, row_idx / ny);
-            let (low, high) = bounds.get_or_insert(([first, y, z], [last, y, z]));
-            *low = [low[0].min(first), low[1].min(y), low[2].min(z)];
-            *high = [high[0].max(last), high[1].max(y), high[2].max(z)];
-        }
-        bounds
+        self.bits.bounding_box()
     }
 }

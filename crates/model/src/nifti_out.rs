@@ -100,7 +100,15 @@ pub fn stored_grid(grid: &Grid) -> Result<Grid, GridError> {
 /// [`NiftiOutError`] if the grid does not fit the format.
 pub fn mask(mask: &Mask) -> Result<Vec<u8>, NiftiOutError> {
     let mut file = File::new(mask.grid(), Scalar::U8, (1.0, 0.0), "espalier mask 1")?;
-    file.planes(mask.as_slice(), |&voxel| [u8::from(voxel)])?;
+    let [nx, ny, nz] = mask.grid().shape();
+    let mut plane = vec![0_u8; nx * ny];
+    for z in 0..nz {
+        plane.fill(0);
+        for y in 0..ny {
+            mask.bits().runs(z * ny + y).for_each(|run| plane[y * nx..][run].fill(1));
+        }
+        file.gz.write_all(&plane)?;
+    }
     file.finish()
 }
 

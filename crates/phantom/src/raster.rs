@@ -6,7 +6,7 @@
 //! joined by OR, so the order of cones and the number of threads do not matter.
 //! **Cost** O(voxels in the cones' boxes), 27-fold only for voxels that a surface may cut.
 
-use espalier_model::{Grid, Mask};
+use espalier_model::{Bits, Grid, Mask};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -135,11 +135,16 @@ impl<'a> Raster<'a> {
 /// The mask of a body: the voxels whose centre lies in it or on its surface.
 pub(crate) fn mask(body: &Body, grid: &Grid) -> Result<Mask, Error> {
     let raster = Raster::new(body, grid)?;
-    let slice_len = raster.shape[0] * raster.shape[1];
-    let mut mask = Mask::empty(grid.clone());
-    mask.as_mut_slice().par_chunks_mut(slice_len).enumerate().for_each(|(z, slice)| {
-        let bits = raster.draw(z, Samples::CentreOnly);
-        slice.iter_mut().zip(bits).for_each(|(voxel, bits)| *voxel = bits & CENTRE != 0);
+    let [nx, ny, _] = raster.shape;
+    let mut bits = Bits::new(raster.shape);
+    let words_per_row = bits.words_per_row();
+    bits.words_mut().par_chunks_mut(words_per_row * ny).enumerate().for_each(|(z, slice)| {
+        let samples = raster.draw(z, Samples::CentreOnly);
+        for (row, samples) in slice.chunks_exact_mut(words_per_row).zip(samples.chunks_exact(nx)) {
+            for (x, _) in samples.iter().enumerate().filter(|&(_, sample)| sample & CENTRE != 0) {
+                row[x / 64] |= 1 << (x % 64);
+            }
+        }
     });
-    Ok(mask)
+    Ok(Mask::new(grid.clone(), bits))
 }

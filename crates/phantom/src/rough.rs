@@ -12,24 +12,31 @@ use rayon::prelude::*;
 /// Flips a share of the voxels on either side of the surface.
 pub(crate) fn roughen(mask: &Mask, share: f64, seed: u64) -> Mask {
     let [nx, ny, nz] = mask.grid().shape();
-    let smooth = mask.as_slice();
-    let mut rough = mask.clone();
-    rough.as_mut_slice().par_chunks_mut(nx * ny).enumerate().for_each(|(z, slice)| {
+    let smooth = mask.bits();
+    let mut rough = smooth.clone();
+    let words_per_row = rough.words_per_row();
+    rough.words_mut().par_chunks_mut(words_per_row * ny).enumerate().for_each(|(z, slice)| {
         if z == 0 || z + 1 == nz {
             return;
         }
         let mut stream = Stream::new(seed, Purpose::PhantomNoise, z as u32, 1);
         for y in 1..ny - 1 {
             for x in 1..nx - 1 {
-                let at = (z * ny + y) * nx + x;
-                let differs = |other: usize| smooth[other] != smooth[at];
-                let is_surface =
-                    [1, nx, nx * ny].into_iter().any(|step| differs(at - step) || differs(at + step));
+                let own = smooth.get([x, y, z]);
+                let neighbours = [
+                    [x - 1, y, z],
+                    [x + 1, y, z],
+                    [x, y - 1, z],
+                    [x, y + 1, z],
+                    [x, y, z - 1],
+                    [x, y, z + 1],
+                ];
+                let is_surface = neighbours.into_iter().any(|neighbour| smooth.get(neighbour) != own);
                 if is_surface && stream.unit() < share {
-                    slice[y * nx + x] = !smooth[at];
+                    slice[y * words_per_row + x / 64] ^= 1 << (x % 64);
                 }
             }
         }
     });
-    rough
+    Mask::new(mask.grid().clone(), rough)
 }

@@ -44,7 +44,7 @@ pub(crate) fn first_ball(bounds: (DVec3, DVec3), grow: impl Fn(u32) -> Shape) ->
 /// edges + faces − cubes of the union of its voxels as closed cubes. Components − tunnels + cavities.
 fn euler_number(mask: &Mask) -> i64 {
     let [nx, ny, _] = mask.grid().shape();
-    let voxels = mask.as_slice();
+    let voxels = mask.to_voxels();
     // The 13 neighbours that come before a voxel in storage order, as bits, with their distance there.
     let earlier: Vec<([i64; 3], usize)> = neighbours()
         .take(13)
@@ -84,8 +84,7 @@ mod tests {
     fn euler_numbers_of_small_bodies() {
         let grid = Grid::axis_aligned([7, 7, 7], DVec3::ONE, DVec3::ZERO).expect("legal");
         let number = |is_inside: &dyn Fn([i64; 3]) -> bool| {
-            let voxels = (0..grid.n_voxels()).map(|i| is_inside(grid.voxel(i).map(|c| c as i64 - 3)));
-            euler_number(&Mask::new(grid.clone(), voxels.collect()))
+            euler_number(&Mask::from_fn(grid.clone(), |voxel| is_inside(voxel.map(|c| c as i64 - 3))))
         };
         let reach = |p: [i64; 3]| p.map(i64::abs).into_iter().max().unwrap_or(0);
         assert_eq!(number(&|_| false), 0);

@@ -144,7 +144,7 @@ fn a_mask_voxel_is_one_whose_centre_lies_in_the_body() {
         let phantom = make(kind, &Params { taper: 0.5, ..params.clone() });
         let mask = phantom.mask.as_ref().expect("a mask");
         let world_from_voxel = mask.grid().world_from_voxel();
-        for (index, &is_inside) in mask.as_slice().iter().enumerate().step_by(7) {
+        for (index, &is_inside) in mask.to_voxels().iter().enumerate().step_by(7) {
             let [x, y, z] = mask.grid().voxel(index).map(|c| c as f64);
             let depth = phantom.body.depth_mm(world_from_voxel.transform_point3(DVec3::new(x, y, z)));
             assert_eq!(is_inside, depth >= 0.0, "{kind:?} voxel {index}: depth {depth}");
@@ -175,7 +175,7 @@ fn the_grid_can_be_shifted_below_a_voxel() {
         let params =
             Params { offset_voxels: [offset; 3], direction: [0.31, 0.77, 0.52], ..Params::default() };
         let phantom = make(Kind::Straight, &params);
-        (phantom.mask.as_ref().map(|mask| mask.as_slice().to_vec()), measured_volume(&phantom), phantom.tree)
+        (phantom.mask.as_ref().map(|mask| mask.to_voxels()), measured_volume(&phantom), phantom.tree)
     };
     let (mask, volume, tree) = volume_at(0.0);
     let (shifted_mask, shifted_volume, shifted_tree) = volume_at(0.37);
@@ -189,11 +189,11 @@ fn rough_masks_flip_the_share_asked_for() {
     let smooth = make(Kind::Straight, &Params::default());
     let rough = make(Kind::Straight, &Params { roughness: 0.15, ..Params::default() });
     let (smooth, rough) = (smooth.mask.expect("a mask"), rough.mask.expect("a mask"));
-    let n_flipped = smooth.as_slice().iter().zip(rough.as_slice()).filter(|(a, b)| a != b).count();
+    let n_flipped = smooth.to_voxels().iter().zip(&rough.to_voxels()).filter(|(a, b)| a != b).count();
     let n_near = (0..smooth.grid().n_voxels())
         .filter(|&index| {
             let [x, y, z] = smooth.grid().voxel(index).map(|c| c as i64);
-            let own = smooth.as_slice()[index];
+            let own = smooth.bits().get(smooth.grid().voxel(index));
             let steps = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]];
             steps.iter().any(|[dx, dy, dz]| smooth.contains([x + dx, y + dy, z + dz]) != own)
         })

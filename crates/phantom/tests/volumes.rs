@@ -100,7 +100,7 @@ fn a_chest_has_the_hu_of_a_chest() {
     // Air outside the airways exists, so a bare threshold is not enough.
     let mask = phantom.mask.expect("a mask");
     let n_other_air =
-        (0..grid.n_voxels()).filter(|&i| volume.value(i) < -950.0 && !mask.as_slice()[i]).count();
+        (0..grid.n_voxels()).filter(|&i| volume.value(i) < -950.0 && !mask.bits().get(grid.voxel(i))).count();
     assert!(n_other_air > mask.n_foreground());
 }
 
@@ -138,11 +138,11 @@ fn the_suggested_band_finds_the_tree_and_a_wide_one_leaks() {
         [(Kind::Airway, [-1024.0, -840.0], 0.7), (Kind::Vessel, [110.0, 400.0], 0.8)]
     {
         let (phantom, volume) = both(kind, &Params::default(), 0);
-        let mask = phantom.mask.as_ref().expect("a mask").as_slice();
+        let mask = phantom.mask.as_ref().expect("a mask").to_voxels();
         let band = phantom.truth.segmentation.expect("has a CT").band_hu;
         let grown = grow(&volume, &phantom, band);
         let n_grown = grown.iter().filter(|&&v| v).count();
-        let n_hit = grown.iter().zip(mask).filter(|&(&g, &m)| g && m).count();
+        let n_hit = grown.iter().zip(&mask).filter(|&(&g, &m)| g && m).count();
         let recall = n_hit as f64 / mask.iter().filter(|&&v| v).count() as f64;
         let precision = n_hit as f64 / n_grown as f64;
         assert!(recall > least_recall && precision > 0.9, "{kind:?}: recall {recall}, precision {precision}");

@@ -94,7 +94,8 @@ impl Artifacts {
         }
         let path = self.locate(Artifact::Mask, lookup)?;
         let volume = self.read_volume(&path, lookup.stage)?.volume;
-        let mask = Arc::new(Mask::new(volume.grid().clone(), volume.map_values(|value| value != 0.0)));
+        let mask =
+            Arc::new(Mask::from_voxels(volume.grid().clone(), &volume.map_values(|value| value != 0.0)));
         self.mask = Some(Arc::clone(&mask));
         Ok(mask)
     }

@@ -327,7 +327,7 @@ pub(crate) fn check_readable(path: &Path) -> Result<(), Error> {
 /// The mask on its grid as a later stage would read it from the file.
 fn on_stored_grid(mask: Mask) -> Result<Mask, GridError> {
     let grid = nifti_out::stored_grid(mask.grid())?;
-    Ok(if grid == *mask.grid() { mask } else { Mask::new(grid, mask.as_slice().to_vec()) })
+    Ok(if grid == *mask.grid() { mask } else { Mask::new(grid, mask.into_bits()) })
 }
 
 fn describe_grid(grid: &Grid) -> String {

@@ -12,6 +12,8 @@
 //! **Cost** O(foreground) time; eight bytes a voxel of the foreground's box, of which the system provides only
 //! the pages that hold foreground.
 
+use std::ops::Range;
+
 use espalier_model::Mask;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -38,7 +40,7 @@ pub struct DistanceField {
 /// ```
 /// use espalier_model::{Grid, Mask};
 /// let grid = Grid::axis_aligned([5, 1, 1], glam::DVec3::new(0.5, 1.0, 1.0), glam::DVec3::ZERO)?;
-/// let field = espalier_radius::distance_field(&Mask::new(grid, vec![false, true, true, true, true]));
+/// let field = espalier_radius::distance_field(&Mask::from_voxels(grid, &[false, true, true, true, true]));
 /// assert_eq!(field.distance_mm([4, 0, 0]), 2.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -107,9 +109,9 @@ impl DistanceField {
     fn foreground(&self, mask: &Mask) -> Vec<usize> {
         let [nx, ny, nz] = self.shape;
         let rows = (0..ny * nz).into_par_iter().map(|row| {
-            let start = mask.grid().index([self.low[0], self.low[1] + row % ny, self.low[2] + row / ny]);
-            let values = &mask.as_slice()[start..start + nx];
-            values.iter().enumerate().filter(|&(_, &v)| v).map(|(x, _)| row * nx + x).collect::<Vec<_>>()
+            let scan_row = (self.low[2] + row / ny) * self.scan_shape[1] + self.low[1] + row % ny;
+            let cells = |run: Range<usize>| run.map(move |x| row * nx + x - self.low[0]);
+            mask.bits().runs(scan_row).flat_map(cells).collect::<Vec<_>>()
         });
         rows.collect::<Vec<_>>().concat()
     }

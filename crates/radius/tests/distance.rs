@@ -16,9 +16,15 @@ fn by_brute_force(mask: &Mask, voxel: [i64; 3]) -> f64 {
     let (grid, spacing) = (mask.grid(), mask.grid().spacing_mm());
     let point = DVec3::from_array(voxel.map(|c| c as f64)) * spacing;
     (0..grid.n_voxels())
-        .filter(|&index| !mask.as_slice()[index])
+        .filter(|&index| !mask.bits().get(grid.voxel(index)))
         .map(|index| (DVec3::from_array(grid.voxel(index).map(|c| c as f64)) * spacing).distance(point))
         .fold(f64::INFINITY, f64::min)
+}
+
+/// White noise.
+fn random(grid: &Grid, stream: &mut Stream, density: f64) -> Mask {
+    let voxels: Vec<bool> = (0..grid.n_voxels()).map(|_| stream.unit() < density).collect();
+    Mask::from_voxels(grid.clone(), &voxels)
 }
 
 fn check(mask: &Mask, name: &str) {
@@ -44,7 +50,7 @@ fn random_masks_of_any_spacing() {
         let grid = Grid::axis_aligned(shape, spacing, DVec3::ZERO).expect("grid");
         // Dense masks have long runs and few sites, sparse ones the opposite; some touch all borders.
         let density = stream.uniform(0.3, 1.0);
-        let mask = Mask::new(grid.clone(), (0..grid.n_voxels()).map(|_| stream.unit() < density).collect());
+        let mask = random(&grid, &mut stream, density);
         check(&mask, &format!("seed {seed}"));
     }
 }
@@ -53,12 +59,11 @@ fn random_masks_of_any_spacing() {
 fn extreme_masks() {
     let grid = |shape| Grid::axis_aligned(shape, DVec3::new(1.0, 2.0, 5.0), DVec3::ZERO).expect("grid");
     check(&Mask::empty(grid([3, 4, 5])), "empty");
-    check(&Mask::new(grid([1, 1, 1]), vec![true]), "one voxel, no background");
+    check(&Mask::from_fn(grid([1, 1, 1]), |_| true), "one voxel, no background");
     let full = grid([4, 3, 2]);
-    check(&Mask::new(full.clone(), vec![true; full.n_voxels()]), "no background");
+    check(&Mask::from_fn(full.clone(), |_| true), "no background");
     for hole in [0, 11, 23] {
-        let voxels = (0..full.n_voxels()).map(|index| index != hole).collect();
-        check(&Mask::new(full.clone(), voxels), &format!("hole at {hole}"));
+        check(&Mask::from_fn(full.clone(), |voxel| full.index(voxel) != hole), &format!("hole at {hole}"));
     }
 }
 
@@ -66,7 +71,7 @@ fn extreme_masks() {
 fn any_number_of_threads_gives_the_same_bits() {
     let grid = Grid::axis_aligned([40, 37, 31], DVec3::new(0.7, 0.7, 3.1), DVec3::ZERO).expect("grid");
     let mut stream = Stream::new(3, Purpose::Test, 12, 0);
-    let mask = Mask::new(grid.clone(), (0..grid.n_voxels()).map(|_| stream.unit() < 0.9).collect());
+    let mask = random(&grid, &mut stream, 0.9);
     let bits = |n_threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().expect("pool");
         let field = pool.install(|| distance_field(&mask));

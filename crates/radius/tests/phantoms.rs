@@ -81,12 +81,9 @@ fn grid_about(extent: DVec3, spacing: DVec3) -> Grid {
 
 fn fill(grid: Grid, is_inside: impl Fn(DVec3) -> bool) -> Mask {
     let to_world = grid.world_from_voxel();
-    let voxels = (0..grid.n_voxels())
-        .map(|index| {
-            is_inside(to_world.transform_point3(DVec3::from_array(grid.voxel(index).map(|c| c as f64))))
-        })
-        .collect();
-    Mask::new(grid, voxels)
+    Mask::from_fn(grid, |voxel| {
+        is_inside(to_world.transform_point3(DVec3::from_array(voxel.map(|c| c as f64))))
+    })
 }
 
 /// Straight tubes in eight directions, at three places relative to the voxels.
@@ -260,7 +257,7 @@ fn any_number_of_threads_gives_the_same_bits() {
 fn bad_input_is_refused() {
     let grid = Grid::axis_aligned([3, 3, 3], DVec3::ONE, DVec3::ZERO).expect("grid");
     let other = Grid::axis_aligned([3, 3, 3], DVec3::ONE, DVec3::X).expect("grid");
-    let mask = Mask::new(grid.clone(), (0..27).map(|index| index == 13).collect());
+    let mask = Mask::from_fn(grid.clone(), |voxel| voxel == [1, 1, 1]);
     let measure = |skeleton| inscribed_spheres(&mask, &skeleton, &Params::default()).map(|_| ());
     assert_eq!(measure(Skeleton::new(grid.clone(), vec![[1, 1, 1]])), Ok(()));
     assert_eq!(measure(Skeleton::new(grid.clone(), vec![])), Err(Error::EmptySkeleton));

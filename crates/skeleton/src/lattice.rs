@@ -48,15 +48,9 @@ impl Lattice {
         let cells = vec![0; shape[0] * shape[1] * shape[2]];
         let mut lattice = Self { cells, shape, stored_axes, bounds, spacing };
 
-        for z in low[2]..=high[2] {
-            for y in low[1]..=high[1] {
-                let row = mask.grid().index([low[0], y, z]);
-                let values = &mask.as_slice()[row..=row + high[0] - low[0]];
-                for (x, _) in (low[0]..).zip(values).filter(|&(_, &value)| value) {
-                    let cell = lattice.cell_of([x, y, z]);
-                    lattice.cells[cell] = FOREGROUND;
-                }
-            }
+        for voxel in mask.voxels() {
+            let cell = lattice.cell_of(voxel);
+            lattice.cells[cell] = FOREGROUND;
         }
         Some(lattice)
     }

@@ -15,7 +15,7 @@
 //! use espalier_model::{Grid, Mask};
 //! use espalier_skeleton::{Params, skeletonize};
 //! let grid = Grid::axis_aligned([20, 3, 3], glam::DVec3::ONE, glam::DVec3::ZERO)?;
-//! let bar = Mask::new(grid.clone(), vec![true; 180]);
+//! let bar = Mask::from_voxels(grid.clone(), &[true; 180]);
 //! let thinned = skeletonize(&bar, &Params::default())?;
 //! assert!(thinned.skeleton.voxels().iter().all(|&[_, y, z]| (y, z) == (1, 1)));
 //! assert!(skeletonize(&Mask::empty(grid), &Params::default()).is_err());

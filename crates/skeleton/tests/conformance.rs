@@ -8,6 +8,7 @@
 
 mod common;
 
+use espalier_model::Mask;
 use espalier_skeleton::{Orientation, Params, Thinning, skeletonize};
 use sha2::{Digest as _, Sha256};
 
@@ -36,7 +37,7 @@ fn lee94_is_the_reference_bit_for_bit() {
             bytes[mask.grid().index(voxel.map(|c| c as usize))] = 1;
         }
         let n_different =
-            bytes.iter().zip(reference.as_slice()).filter(|&(&ours, &theirs)| (ours == 1) != theirs).count();
+            bytes.iter().zip(reference.to_voxels()).filter(|&(&ours, theirs)| (ours == 1) != theirs).count();
         assert_eq!((skeleton.voxels().len(), n_different), (n_voxels, 0), "{name}: voxels, different");
         let hex: String = Sha256::digest(&bytes).iter().take(8).map(|byte| format!("{byte:02x}")).collect();
         assert_eq!(hex, digest, "{name}");
@@ -66,11 +67,10 @@ fn lee94_is_scikit_image_on_small_volumes() {
             panic!("not six fields: {line}")
         };
         let shape = [nx, ny, nz].map(|extent| extent.parse().expect("an extent"));
-        let mut mask = common::mask_of(shape, |_| false);
-        let volume = unpacked(volume, mask.as_slice().len());
-        mask.as_mut_slice().copy_from_slice(&volume);
+        let volume = unpacked(volume, shape.iter().product());
+        let mask = Mask::from_voxels(common::grid(shape), &volume);
         let expected = unpacked(skeleton, volume.len());
-        assert!(common::skeleton_mask(&mask, &params).as_slice() == expected, "{name} {shape:?}");
+        assert!(common::skeleton_mask(&mask, &params).to_voxels() == expected, "{name} {shape:?}");
         n_cases += 1;
         n_voxels += expected.iter().filter(|&&voxel| voxel).count();
     }

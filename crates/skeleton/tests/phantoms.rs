@@ -68,10 +68,7 @@ fn check_tubes(directions: &[DVec3], max_extra_ends: usize) {
                 continue;
             }
             let thinned = skeletonize(&mask, &Params::default()).expect("not empty");
-            let grid = mask.grid();
-            let centers = (0..grid.n_voxels())
-                .filter(|&index| mask.as_slice()[index])
-                .map(|index| DVec3::from_array(grid.voxel(index).map(|c| c as f64)));
+            let centers = mask.voxels().map(|voxel| DVec3::from_array(voxel.map(|c| c as f64)));
             let length = extent(centers, direction);
             let kept = extent(thinned.skeleton.voxels().iter().map(|&v| point(v)), direction);
             let margin = kept - (length - f64::from(width));
@@ -178,11 +175,10 @@ fn orientation_ras_undoes_the_storage_order() {
     // The same body stored as (z, x, y) with x running from right to left.
     let affine = DAffine3::from_cols(DVec3::Z, DVec3::NEG_X, DVec3::Y, DVec3::new(29.0, 0.0, 0.0));
     let grid = Grid::new([26, 30, 24], affine).expect("grid");
-    let stored = (0..grid.n_voxels()).map(|i| {
-        let [z, x, y] = grid.voxel(i).map(|c| c as f64);
+    let turned = Mask::from_fn(grid, |voxel| {
+        let [z, x, y] = voxel.map(|c| c as f64);
         body(DVec3::new(29.0 - x, y, z))
     });
-    let turned = Mask::new(grid.clone(), stored.collect());
 
     let mut ours = safe(&turned).into_iter().map(|[z, x, y]| [29 - x, y, z]).collect::<Vec<_>>();
     ours.sort_unstable_by_key(|&[x, y, z]| [z, y, x]);

@@ -8,7 +8,7 @@
 
 mod common;
 
-use common::{mask_of, skeleton_mask, topology};
+use common::{grid, mask_of, skeleton_mask, topology};
 use espalier_geom::random::{Purpose, Stream};
 use espalier_model::Mask;
 use espalier_skeleton::{Orientation, Params, Thinning, skeletonize};
@@ -21,9 +21,7 @@ fn random_mask(seed: u32) -> Mask {
     if seed % 2 == 1 {
         let density = stream.uniform(0.1, 0.9);
         let noise: Vec<bool> = (0..shape.iter().product()).map(|_| stream.unit() < density).collect();
-        let mut mask = mask_of(shape, |_| false);
-        mask.as_mut_slice().copy_from_slice(&noise);
-        return mask;
+        return Mask::from_voxels(grid(shape), &noise);
     }
     let size = DVec3::from_array(shape.map(|n| n as f64));
     let balls: Vec<(DVec3, f64)> = (0..3 + stream.below(9))

@@ -65,7 +65,7 @@ pub fn segment(volume: &Volume, params: &Params) -> Result<Segmented, Error> {
     if params.fill_cavities {
         cavities::fill(&mut voxels, grid.shape(), &mut report);
     }
-    let mask = Mask::new(grid.clone(), voxels);
+    let mask = Mask::from_voxels(grid.clone(), &voxels);
     let n_foreground = mask.n_foreground();
     report.count_usize("foreground_voxels", n_foreground);
     report.count("foreground_ml", millilitres(n_foreground));

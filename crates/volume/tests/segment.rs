@@ -22,7 +22,7 @@ fn picture(segmented: &Segmented) -> String {
     let [nx, ny, _] = segmented.mask.grid().shape();
     let row = |row: &[bool]| row.iter().map(|&v| if v { '#' } else { '.' }).collect::<String>();
     let plane = |plane: &[bool]| plane.chunks(nx).map(row).collect::<Vec<_>>().join(" ");
-    segmented.mask.as_slice().chunks(nx * ny).map(plane).collect::<Vec<_>>().join(" | ")
+    segmented.mask.to_voxels().chunks(nx * ny).map(plane).collect::<Vec<_>>().join(" | ")
 }
 
 fn check(text: &str, params: &Params, expected: &str) -> Segmented {

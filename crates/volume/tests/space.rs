@@ -315,7 +315,7 @@ fn every_kind_of_output_comes_back() {
         volume.map_values(|value| value)
     };
     let is_set = |i: usize| i % 5 == 1;
-    let mask = Mask::new(grid.clone(), (0..24).map(is_set).collect());
+    let mask = Mask::from_fn(grid.clone(), |voxel| is_set(grid.index(voxel)));
     let expected: Vec<f64> = (0..24).map(|i| f64::from(u8::from(is_set(i)))).collect();
     assert_eq!(read_values(nifti_out::mask(&mask).expect("fits")), expected);
     let voxels = (0..24).filter(|&i| is_set(i)).map(|i| grid.voxel(i).map(|v| v as u32)).collect();

@@ -11,12 +11,11 @@ pub(crate) fn euler_number(mask: &Mask) -> i64 {
     let [nx, ny, nz] = [0, 1, 2].map(|axis| high[axis] - low[axis] + 3);
     // A copy with one voxel of background about it.
     let mut cells = vec![0_u8; nx * ny * nz];
-    let view = mask.view();
     for z in low[2]..=high[2] {
         for y in low[1]..=high[1] {
             for x in low[0]..=high[0] {
                 let at = ((z - low[2] + 1) * ny + y - low[1] + 1) * nx + x - low[0] + 1;
-                cells[at] = u8::from(view[[z, y, x]]);
+                cells[at] = u8::from(mask.bits().get([x, y, z]));
             }
         }
     }
@@ -44,7 +43,7 @@ pub(crate) fn n_components(mask: &Mask) -> usize {
     let mut is_seen = vec![false; grid.n_voxels()];
     let mut n_components = 0;
     for start in 0..grid.n_voxels() {
-        if is_seen[start] || !mask.as_slice()[start] {
+        if is_seen[start] || !mask.bits().get(grid.voxel(start)) {
             continue;
         }
         n_components += 1;

@@ -36,16 +36,19 @@ pub(crate) fn read_mask(path: &Path) -> Mask {
     let grid = Grid::axis_aligned(shape, spacing, DVec3::ZERO).expect("grid");
     let width = usize::try_from(short(72)).expect("bitpix") / 8;
     let body = &bytes[float(108) as usize..][..grid.n_voxels() * width];
-    Mask::new(grid, body.chunks_exact(width).map(|voxel| voxel.iter().any(|&byte| byte != 0)).collect())
+    let voxels: Vec<bool> =
+        body.chunks_exact(width).map(|voxel| voxel.iter().any(|&byte| byte != 0)).collect();
+    Mask::from_voxels(grid, &voxels)
 }
 
 /// A mask on a grid of spacing 1 from a predicate of the voxel coordinates.
 pub(crate) fn mask_of(shape: [usize; 3], inside: impl Fn(DVec3) -> bool) -> Mask {
-    let grid = Grid::axis_aligned(shape, DVec3::ONE, DVec3::ZERO).expect("grid");
-    let voxels = (0..grid.n_voxels())
-        .map(|index| inside(DVec3::from_array(grid.voxel(index).map(|c| c as f64))))
-        .collect();
-    Mask::new(grid, voxels)
+    Mask::from_fn(grid(shape), |voxel| inside(DVec3::from_array(voxel.map(|c| c as f64))))
+}
+
+/// A grid of spacing 1.
+pub(crate) fn grid(shape: [usize; 3]) -> Grid {
+    Grid::axis_aligned(shape, DVec3::ONE, DVec3::ZERO).expect("grid")
 }
 
 /// The skeleton as a mask on the same grid.
@@ -53,19 +56,16 @@ pub(crate) fn skeleton_mask(mask: &Mask, params: &espalier_skeleton::Params) -> 
     let thinned = espalier_skeleton::skeletonize(mask, params).expect("not empty");
     let mut out = Mask::empty(mask.grid().clone());
     for voxel in thinned.skeleton.voxels() {
-        let index = mask.grid().index(voxel.map(|c| c as usize));
-        out.as_mut_slice()[index] = true;
+        out.bits_mut().set(voxel.map(|c| c as usize));
     }
     out
 }
 
 /// 26-connected components and Euler number, counted cell by cell, apart from the crate's own code.
 pub(crate) fn topology(mask: &Mask) -> (usize, i32) {
-    let grid = mask.grid();
     let mut cells = std::collections::BTreeSet::new();
     let mut left = std::collections::BTreeSet::new();
-    for voxel in (0..grid.n_voxels()).filter(|&i| mask.as_slice()[i]).map(|i| grid.voxel(i).map(|c| c as i64))
-    {
+    for voxel in mask.voxels().map(|voxel| voxel.map(|c| c as i64)) {
         left.insert(voxel);
         for d in offsets() {
             cells.insert([0, 1, 2].map(|axis| 2 * voxel[axis] + d[axis]));

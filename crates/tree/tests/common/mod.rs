@@ -22,8 +22,7 @@ pub(crate) fn inputs(places: &Places, shape: [usize; 3]) -> (Mask, Skeleton, Ins
                     }
                     let near = [voxel[0] as i64 + dx, voxel[1] as i64 + dy, voxel[2] as i64 + dz];
                     if (0..3).all(|axis| near[axis] >= 0 && near[axis] < shape[axis] as i64) {
-                        let index = grid.index(near.map(|v| v as usize));
-                        mask.as_mut_slice()[index] = true;
+                        mask.bits_mut().set(near.map(|v| v as usize));
                     }
                 }
             }
