@@ -1,15 +1,16 @@
 //! The largest components of a mask.
 //!
-//! **Input** one `bool` a voxel, and how many components stay. **Output** the same without the others, and a
-//! ledger entry for each that went.
+//! **Input** a mask and its runs; how many components stay, and from which volume on. **Output** the same without
+//! the others, and a ledger entry for each that went.
 //! **Steps** 1. label the 26-connected components; 2. rank them by size, of equal ones the first in storage order;
-//! 3. clear all beyond the limit.
-//! **Cost** O(voxels) time, O(runs) memory.
+//! 3. clear all beyond the limits.
+//! **Cost** O(runs · α(runs)) time, O(runs) memory.
 
-use espalier_model::{Grid, Ledger, LedgerEntry, LedgerKind, Report};
+use espalier_model::{Bits, Grid, Ledger, LedgerEntry, LedgerKind, Report};
 use glam::DVec3;
 
-use crate::runs::{Connectivity, Labelled, label};
+use crate::Params;
+use crate::runs::{Components, Connectivity, Runs};
 
 /// How many dropped components the ledger lists one by one; a noisy threshold drops thousands.
 const MAX_LISTED: usize = 200;
@@ -33,59 +34,83 @@ impl Component {
     }
 }
 
-/// Keeps the `limit` largest components and clears the others.
-pub(crate) fn keep_largest(voxels: &mut [bool], grid: &Grid, limit: usize, report: &mut Report) -> Ledger {
-    let labelled = label(voxels, grid.shape(), true, Connectivity::All);
-    let components = measure(&labelled, grid);
+/// Clears all components but those that the policy keeps; tells how many went.
+pub(crate) fn keep(
+    bits: &mut Bits,
+    runs: &Runs,
+    grid: &Grid,
+    params: &Params,
+    report: &mut Report,
+) -> (Ledger, usize) {
+    let labelled = runs.components(Connectivity::All);
+    let components = measure(runs, &labelled, grid);
     let mut ranked: Vec<usize> = (0..components.len()).collect();
     // A stable sort: of equal components the first in storage order comes first.
     ranked.sort_by_key(|&component| std::cmp::Reverse(components[component].n_voxels));
-    let dropped = &ranked[limit.min(ranked.len())..];
+    let millilitres =
+        |component: usize| components[component].n_voxels as f64 * grid.voxel_volume_mm3() / 1e3;
+    let n_large = ranked.partition_point(|&component| millilitres(component) >= params.min_component_ml);
+    let n_kept = n_large.min(params.components.limit());
+    let (_, dropped) = ranked.split_at(n_kept);
+    clear(bits, runs, &labelled, dropped);
 
-    let mut is_dropped = vec![false; components.len()];
-    dropped.iter().for_each(|&component| is_dropped[component] = true);
-    let nx = grid.shape()[0];
-    for (run, &component) in labelled.runs.iter().zip(&labelled.component) {
-        if is_dropped[component] {
-            voxels[run.row * nx + run.start..run.row * nx + run.end].fill(false);
-        }
-    }
-
+    let size = |component: Option<&usize>| component.map_or(0, |&component| components[component].n_voxels);
     let n_dropped_voxels = dropped.iter().map(|&component| components[component].n_voxels).sum();
     report.count_usize("components", components.len());
     report.count_usize("components_dropped", dropped.len());
     report.count_usize("components_dropped_voxels", n_dropped_voxels);
-    report.count_usize("component_largest_voxels", ranked.first().map_or(0, |&c| components[c].n_voxels));
-    report.count_usize(
-        "component_dropped_largest_voxels",
-        dropped.first().map_or(0, |&c| components[c].n_voxels),
-    );
-    let dropped: Vec<Component> = dropped.iter().map(|&component| components[component]).collect();
-    ledger_of(&dropped, grid, limit)
+    report.count_usize("component_largest_voxels", size(ranked.first()));
+    report.count_usize("component_dropped_largest_voxels", size(dropped.first()));
+    let entries: Vec<Component> = dropped.iter().map(|&component| components[component]).collect();
+    (ledger_of(&entries, grid, params), dropped.len())
 }
 
-fn measure(labelled: &Labelled, grid: &Grid) -> Vec<Component> {
+fn clear(bits: &mut Bits, runs: &Runs, labelled: &Components, dropped: &[usize]) {
+    if dropped.is_empty() {
+        return;
+    }
+    let mut is_dropped = vec![false; labelled.n_components];
+    dropped.iter().for_each(|&component| is_dropped[component] = true);
+    for row in 0..runs.n_rows() {
+        for run in runs.of_row(row).filter(|&run| is_dropped[labelled.of_run[run]]) {
+            bits.clear_run(row, runs.all()[run].range());
+        }
+    }
+}
+
+fn measure(runs: &Runs, labelled: &Components, grid: &Grid) -> Vec<Component> {
     let ny = grid.shape()[1];
     let mut components = vec![Component::default(); labelled.n_components];
-    for (run, &component) in labelled.runs.iter().zip(&labelled.component) {
-        let n_voxels = run.len();
-        let x_sum = (run.start + run.end - 1) as f64 * n_voxels as f64 / 2.0;
-        let (y, z) = (run.row % ny, run.row / ny);
-        let voxel_sum = DVec3::new(x_sum, (y * n_voxels) as f64, (z * n_voxels) as f64);
-        components[component].add(Component { n_voxels, voxel_sum });
+    for row in 0..runs.n_rows() {
+        let (y, z) = ((row % ny) as f64, (row / ny) as f64);
+        for run_idx in runs.of_row(row) {
+            let run = runs.all()[run_idx];
+            let n = run.len() as f64;
+            let x_sum = (f64::from(run.start) + f64::from(run.end - 1)) * n / 2.0;
+            let voxel_sum = DVec3::new(x_sum, y * n, z * n);
+            components[labelled.of_run[run_idx]].add(Component { n_voxels: run.len(), voxel_sum });
+        }
     }
     components
 }
 
 /// An entry for each dropped component, largest first; one for all beyond [`MAX_LISTED`].
-fn ledger_of(dropped: &[Component], grid: &Grid, limit: usize) -> Ledger {
+fn ledger_of(dropped: &[Component], grid: &Grid, params: &Params) -> Ledger {
     let millilitres = |n_voxels: usize| n_voxels as f64 * grid.voxel_volume_mm3() / 1000.0;
+    let mut rule = match params.components.limit() {
+        usize::MAX => String::new(),
+        limit => format!("the {limit} largest stay"),
+    };
+    if params.min_component_ml > 0.0 {
+        let joint = if rule.is_empty() { "" } else { ", " };
+        rule = format!("{rule}{joint}those of at least {} ml stay", params.min_component_ml);
+    }
     let entry = |component: &Component, what: String| LedgerEntry {
         kind: LedgerKind::ComponentDropped,
         position_mm: component.centroid_mm(grid),
         radius_mm: 0.0,
         length_mm: 0.0,
-        reason: format!("{what}, {:.4} ml; the {limit} largest stay", millilitres(component.n_voxels)),
+        reason: format!("{what}, {:.4} ml; {rule}", millilitres(component.n_voxels)),
     };
     let (listed, rest) = dropped.split_at(dropped.len().min(MAX_LISTED));
     let mut entries: Vec<LedgerEntry> = listed

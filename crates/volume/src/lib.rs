@@ -9,10 +9,11 @@
 //! | sheared axes to orthogonal ones | `orthogonal` |
 //! | **[`read`]**: file → [`Volume`](espalier_model::Volume) | `read` |
 //! | what a volume is: mask, labels, CT | `kind` |
-//! | mask, label, threshold band | `select` |
+//! | mask, label, threshold band | `select`, `choose` |
 //! | region growing from a seed | `region_grow` |
 //! | connected components by runs of voxels | `runs`, `components` |
 //! | cavities filled | `cavities` |
+//! | tunnels counted | `euler` |
 //! | **[`segment`]**: `Volume` → [`Mask`](espalier_model::Mask) | `segment` |
 //!
 //! **Spaces** World is RAS+ mm. A voxel is (x, y, z) on the file's own axes, x fastest.
@@ -30,6 +31,7 @@ mod decode;
 mod orthogonal;
 mod read;
 
+mod choose;
 mod kind;
 mod region_grow;
 mod runs;
@@ -37,6 +39,9 @@ mod select;
 
 mod cavities;
 mod components;
+mod euler;
+#[cfg(test)]
+mod flood;
 mod segment;
 
 mod error;
@@ -44,8 +49,9 @@ mod params;
 mod read_error;
 
 pub use error::Error;
+pub use euler::euler_number;
 pub use kind::{Kind, inspect_kind};
 pub use params::{AssumedSpace, Components, Method, Params, ReadOptions};
 pub use read::{Loaded, read};
 pub use read_error::ReadError;
-pub use segment::{Segmented, segment};
+pub use segment::{Segmented, clean, segment};

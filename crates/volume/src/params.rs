@@ -62,6 +62,9 @@ pub struct Params {
     /// How many 26-connected components stay, the largest first: `"largest"`, `"all"`, or a number from 1.
     /// Default `"largest"`: the islands of a mask are mostly noise, and a tree is one piece.
     pub components: Components,
+    /// The least volume of a component that stays, in ml, 0 to 1e6. Default 0: all that `components` keeps. With
+    /// `components = "all"`, every component of at least this volume. Larger: fewer and larger components.
+    pub min_component_ml: f64,
     /// Whether background that is closed in by the mask (6-connected) becomes foreground. Default true: a cavity
     /// would become a closed shell in the skeleton.
     pub fill_cavities: bool,
@@ -77,6 +80,7 @@ impl Default for Params {
             seed_mm: None,
             label: None,
             components: Components::Largest,
+            min_component_ml: 0.0,
             fill_cavities: true,
         }
     }
@@ -215,7 +219,10 @@ impl Params {
         let needs_label = method == Method::Label && self.label.is_none();
         ParamError::check("label", !needs_label, "must be set with method = \"label\"")?;
         let keeps_one = self.components.limit() > 0;
-        ParamError::check("components", keeps_one, "must be \"largest\", \"all\" or a number from 1, is 0")
+        ParamError::check("components", keeps_one, "must be \"largest\", \"all\" or a number from 1, is 0")?;
+        let least = self.min_component_ml;
+        let message = format!("must be from 0 to 1e6, is {least}");
+        ParamError::check("min_component_ml", (0.0..=1e6).contains(&least), message)
     }
 
     fn validate_band(&self) -> Result<(), ParamError> {

@@ -1,14 +1,19 @@
-//! Connected components by runs of voxels.
+//! Runs of foreground, and which of them connect.
 //!
-//! **Input** one `bool` a voxel, x fastest; which of the two values; how voxels connect. **Output** the runs of
-//! that value along x, each with the number of its component.
-//! **Notation** R runs.
-//! **Steps** 1. cut each row into runs; 2. join each run with those that it touches in the rows before it;
-//! 3. number the components in the order of their first voxel.
-//! **Guarantees** the numbering depends on the voxels only.
-//! **Cost** O(voxels + R · α(R)) time, O(R + rows) memory: a label for every voxel would take four times the mask.
+//! **Input** [`Bits`]. **Output** [`Runs`], the maximal runs along x of each row; for them the number of each one's
+//! connected component.
+//! **Notation** R runs; row (y, z) is the line of voxels with these coordinates.
+//! **Steps** 1. cut each row, by counting the zeros at the end of its words; 2. join runs of neighbouring rows that
+//! touch: over a face their intervals overlap, over an edge or corner they may also be next to each other.
+//! **Guarantees** components are numbered in the order of their first voxel in storage order; the result depends
+//! on the voxels only, not on the number of threads.
+//! **Cost** O(words + R · α(R)) time, O(R + rows) memory. A row of zeros costs a look at its words.
+
+use std::ops::Range;
 
 use espalier_geom::union_find::UnionFind;
+use espalier_model::Bits;
+use rayon::prelude::*;
 
 /// How voxels connect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,67 +24,134 @@ pub(crate) enum Connectivity {
     All,
 }
 
-/// Voxels `start..end` of one row; row `z · ny + y`.
+/// Voxels `start..end` of a row. Half the size of a range of `usize`: noise has a run for every fourth voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Run {
-    pub(crate) row: usize,
-    pub(crate) start: usize,
-    pub(crate) end: usize,
+    pub(crate) start: u32,
+    pub(crate) end: u32,
 }
 
 impl Run {
     pub(crate) fn len(&self) -> usize {
-        self.end - self.start
+        (self.end - self.start) as usize
+    }
+
+    pub(crate) fn range(&self) -> Range<usize> {
+        self.start as usize..self.end as usize
     }
 }
 
-/// Runs and their components.
-pub(crate) struct Labelled {
+/// The runs of a volume, row by row.
+pub(crate) struct Runs {
+    shape: [usize; 3],
     /// In storage order.
-    pub(crate) runs: Vec<Run>,
-    /// The component of each run, numbered by first voxel.
-    pub(crate) component: Vec<usize>,
+    runs: Vec<Run>,
+    /// Where each row's runs begin, and where the last row's end.
+    row_starts: Vec<usize>,
+}
+
+/// The number of each run's component, and how many components there are.
+pub(crate) struct Components {
+    pub(crate) of_run: Vec<usize>,
     pub(crate) n_components: usize,
 }
 
-pub(crate) fn label(
-    voxels: &[bool],
-    [nx, ny, nz]: [usize; 3],
-    value: bool,
-    connectivity: Connectivity,
-) -> Labelled {
-    let (runs, row_starts) = cut_rows(voxels, nx, value);
-    let mut joined = UnionFind::new(runs.len());
-    for z in 0..nz {
-        for y in 0..ny {
-            let row = z * ny + y;
-            let here = row_starts[row]..row_starts[row + 1];
-            if here.is_empty() {
-                continue;
-            }
-            for other in rows_before([y, z], ny, connectivity).into_iter().flatten() {
-                let before = row_starts[other]..row_starts[other + 1];
-                join_touching(&runs, here.clone(), before, connectivity, &mut joined);
-            }
-        }
-    }
-    let (component, n_components) = joined.into_numbers();
-    Labelled { runs, component, n_components }
-}
-
-/// The runs of `value`, and where each row's begin.
-fn cut_rows(voxels: &[bool], nx: usize, value: bool) -> (Vec<Run>, Vec<usize>) {
-    let mut runs = Vec::new();
-    let mut row_starts = vec![0];
-    for (row, line) in voxels.chunks_exact(nx).enumerate() {
-        let mut end = 0;
-        while let Some(start) = line[end..].iter().position(|&v| v == value).map(|gap| end + gap) {
-            end = line[start..].iter().position(|&v| v != value).map_or(nx, |length| start + length);
-            runs.push(Run { row, start, end });
+impl Runs {
+    /// Cuts the rows of a volume into runs.
+    pub(crate) fn cut(bits: &Bits) -> Self {
+        let [_, ny, nz] = bits.shape();
+        let slices: Vec<(Vec<Run>, Vec<u32>)> =
+            (0..nz).into_par_iter().map(|z| cut_rows(bits, z * ny..(z + 1) * ny)).collect();
+        let mut runs = Vec::with_capacity(slices.iter().map(|(runs, _)| runs.len()).sum());
+        let mut row_starts = Vec::with_capacity(bits.n_rows() + 1);
+        for (slice, counts) in slices {
+            let first = runs.len();
+            row_starts.extend(counts.iter().map(|&before| first + before as usize));
+            runs.extend(slice);
         }
         row_starts.push(runs.len());
+        Self { shape: bits.shape(), runs, row_starts }
     }
-    (runs, row_starts)
+
+    /// All runs, in storage order.
+    pub(crate) fn all(&self) -> &[Run] {
+        &self.runs
+    }
+
+    /// The places in [`Runs::all`] of the runs of a row.
+    pub(crate) fn of_row(&self, row: usize) -> Range<usize> {
+        self.row_starts[row]..self.row_starts[row + 1]
+    }
+
+    /// The runs of a row.
+    pub(crate) fn row(&self, row: usize) -> &[Run] {
+        &self.runs[self.of_row(row)]
+    }
+
+    /// The number of rows.
+    pub(crate) fn n_rows(&self) -> usize {
+        self.row_starts.len() - 1
+    }
+
+    /// The run that holds a voxel.
+    pub(crate) fn find(&self, [x, y, z]: [usize; 3]) -> Option<usize> {
+        let row = self.of_row(z * self.shape[1] + y);
+        let run = row.start + self.runs[row.clone()].partition_point(|run| run.end as usize <= x);
+        (run < row.end && self.runs[run].range().contains(&x)).then_some(run)
+    }
+
+    /// The connected components.
+    pub(crate) fn components(&self, connectivity: Connectivity) -> Components {
+        let [_, ny, nz] = self.shape;
+        let mut joined = UnionFind::new(self.runs.len());
+        for z in 0..nz {
+            for y in 0..ny {
+                let here = self.of_row(z * ny + y);
+                if here.is_empty() {
+                    continue;
+                }
+                for other in rows_before([y, z], ny, connectivity).into_iter().flatten() {
+                    self.join_touching(here.clone(), self.of_row(other), connectivity, &mut joined);
+                }
+            }
+        }
+        let (of_run, n_components) = joined.into_numbers();
+        Components { of_run, n_components }
+    }
+
+    /// Joins the runs of two rows that touch, walking along both.
+    fn join_touching(
+        &self,
+        here: Range<usize>,
+        before: Range<usize>,
+        connectivity: Connectivity,
+        joined: &mut UnionFind,
+    ) {
+        let reach = u32::from(connectivity == Connectivity::All);
+        let runs = &self.runs;
+        let (mut a, mut b) = (here.start, before.start);
+        while a < here.end && b < before.end {
+            if runs[a].start < runs[b].end + reach && runs[b].start < runs[a].end + reach {
+                joined.join(a, b);
+            }
+            // The run that ends first cannot touch anything further along.
+            if runs[a].end < runs[b].end { a += 1 } else { b += 1 }
+        }
+    }
+}
+
+/// The runs of some rows, and how many come before each of these rows.
+fn cut_rows(bits: &Bits, rows: Range<usize>) -> (Vec<Run>, Vec<u32>) {
+    let mut runs = Vec::new();
+    let mut n_before = Vec::with_capacity(rows.len());
+    for row in rows {
+        // A slice of a volume that fits in memory has fewer than 2³² runs, and a row fewer voxels.
+        n_before.push(runs.len() as u32);
+        if bits.row(row).iter().any(|&word| word != 0) {
+            runs.extend(bits.runs(row).map(|run| Run { start: run.start as u32, end: run.end as u32 }));
+        }
+    }
+    (runs, n_before)
 }
 
 /// The rows before row (y, z) in storage order that its voxels can touch.
@@ -94,89 +166,32 @@ fn rows_before([y, z]: [usize; 2], ny: usize, connectivity: Connectivity) -> [Op
     ]
 }
 
-/// Joins the runs of two rows that touch, walking along both.
-fn join_touching(
-    runs: &[Run],
-    here: std::ops::Range<usize>,
-    before: std::ops::Range<usize>,
-    connectivity: Connectivity,
-    joined: &mut UnionFind,
-) {
-    let reach = usize::from(connectivity == Connectivity::All);
-    let (mut a, mut b) = (here.start, before.start);
-    while a < here.end && b < before.end {
-        if runs[a].start < runs[b].end + reach && runs[b].start < runs[a].end + reach {
-            joined.join(a, b);
-        }
-        // The run that ends first cannot touch anything further along.
-        if runs[a].end < runs[b].end { a += 1 } else { b += 1 }
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use espalier_geom::random::{Purpose, Stream};
-
     use super::*;
-
-    /// The plain form: flood fill voxel by voxel, in storage order.
-    fn flood(
-        voxels: &[bool],
-        [nx, ny, nz]: [usize; 3],
-        value: bool,
-        connectivity: Connectivity,
-    ) -> Vec<usize> {
-        let mut component = vec![usize::MAX; voxels.len()];
-        let mut n_components = 0;
-        for start in 0..voxels.len() {
-            if voxels[start] != value || component[start] != usize::MAX {
-                continue;
-            }
-            component[start] = n_components;
-            let mut stack = vec![start];
-            while let Some(index) = stack.pop() {
-                let [x, y, z] = [index % nx, index / nx % ny, index / (nx * ny)].map(|v| v as i64);
-                for step in 0..27_i64 {
-                    let d = [step % 3 - 1, step / 3 % 3 - 1, step / 9 - 1];
-                    let n_axes = d.iter().filter(|&&v| v != 0).count();
-                    if connectivity == Connectivity::Faces && n_axes != 1 {
-                        continue;
-                    }
-                    let [x, y, z] = [x + d[0], y + d[1], z + d[2]];
-                    let is_inside = (0..nx as i64).contains(&x)
-                        && (0..ny as i64).contains(&y)
-                        && (0..nz as i64).contains(&z);
-                    if is_inside {
-                        let other = (z as usize * ny + y as usize) * nx + x as usize;
-                        if voxels[other] == value && component[other] == usize::MAX {
-                            component[other] = n_components;
-                            stack.push(other);
-                        }
-                    }
-                }
-            }
-            n_components += 1;
-        }
-        component
-    }
+    use crate::flood::{flood, random_bits};
 
     #[test]
     fn equals_flood_fill_on_random_volumes() {
-        let mut stream = Stream::new(5, Purpose::Test, 0, 0);
-        for case in 0..300_u32 {
-            let shape = [1 + stream.below(9), 1 + stream.below(7), 1 + stream.below(6)].map(|v| v as usize);
-            let density = stream.uniform(0.05, 0.95);
-            let voxels: Vec<bool> = (0..shape.iter().product()).map(|_| stream.unit() < density).collect();
+        for case in 0..300 {
+            let bits = random_bits(case);
+            let [nx, ny, _] = bits.shape();
+            let runs = Runs::cut(&bits);
             for connectivity in [Connectivity::Faces, Connectivity::All] {
-                for value in [true, false] {
-                    let labelled = label(&voxels, shape, value, connectivity);
-                    let mut found = vec![usize::MAX; voxels.len()];
-                    for (run, &component) in labelled.runs.iter().zip(&labelled.component) {
-                        found[run.row * shape[0] + run.start..run.row * shape[0] + run.end].fill(component);
+                let components = runs.components(connectivity);
+                let mut found = vec![usize::MAX; nx * bits.n_rows()];
+                for row in 0..runs.n_rows() {
+                    for run in runs.of_row(row) {
+                        let range = runs.all()[run].range();
+                        found[row * nx..][range].fill(components.of_run[run]);
                     }
-                    let expected = flood(&voxels, shape, value, connectivity);
-                    assert_eq!(found, expected, "case {case} {shape:?} {connectivity:?} {value}");
                 }
+                assert_eq!(found, flood(&bits, true, connectivity), "case {case} {connectivity:?}");
+            }
+            for (index, x) in (0..nx * bits.n_rows()).map(|index| (index, index % nx)) {
+                let voxel = [x, index / nx % ny, index / (nx * ny)];
+                let run = runs.find(voxel).filter(|&run| runs.all()[run].range().contains(&x));
+                assert_eq!(run.is_some(), bits.get(voxel), "case {case} {voxel:?}");
             }
         }
     }

@@ -7,6 +7,7 @@
 
 use espalier_model::{Ledger, Mask, Report, Volume};
 
+use crate::runs::Runs;
 use crate::select::select;
 use crate::{Error, Params, cavities, components};
 
@@ -42,31 +43,54 @@ pub fn segment(volume: &Volume, params: &Params) -> Result<Segmented, Error> {
     params.validate()?;
     let grid = volume.grid();
     let mut report = Report::default();
-    let millilitres = |n_voxels: usize| n_voxels as f64 * grid.voxel_volume_mm3() / 1000.0;
 
     // Choose the organ's voxels.
     let selection = select(volume, params)?;
-    let mut voxels = selection.voxels;
-    let n_selected = voxels.iter().filter(|&&voxel| voxel).count();
+    let n_selected = selection.bits.count();
     if n_selected == 0 {
         let (min, max) = range(volume);
         return Err(Error::Empty { what: selection.what, min, max });
     }
-    report.count_usize("selected_voxels", n_selected);
-    report.count("selected_ml", millilitres(n_selected));
-    if n_selected == voxels.len() {
+    if n_selected == grid.n_voxels() {
         report.warn("W-VOLUME-FULL", format!("{} holds every voxel of the volume", selection.what));
     }
+    let cleaned = clean(Mask::new(grid.clone(), selection.bits), params)?;
+    report.extend(cleaned.report);
+    Ok(Segmented { report, ..cleaned })
+}
+
+/// Cleans a mask: of the parameters, all that do not choose voxels.
+///
+/// # Errors
+/// [`Error`] for parameters out of range, and for a mask of which nothing is left.
+pub fn clean(mask: Mask, params: &Params) -> Result<Segmented, Error> {
+    params.validate()?;
+    let mut report = Report::default();
+    let grid = mask.grid().clone();
+    let millilitres = |n_voxels: usize| n_voxels as f64 * grid.voxel_volume_mm3() / 1000.0;
+    let mut bits = mask.into_bits();
+    let n_selected = bits.count();
+    report.count_usize("selected_voxels", n_selected);
+    report.count("selected_ml", millilitres(n_selected));
 
     // Drop all but the largest components.
-    let ledger = components::keep_largest(&mut voxels, grid, params.components.limit(), &mut report);
+    let runs = Runs::cut(&bits);
+    let (ledger, n_dropped) = components::keep(&mut bits, &runs, &grid, params, &mut report);
+    let runs = if n_dropped > 0 { Runs::cut(&bits) } else { runs };
 
     // Fill cavities.
     if params.fill_cavities {
-        cavities::fill(&mut voxels, grid.shape(), &mut report);
+        let cavities = cavities::find(&runs, grid.shape());
+        cavities::fill(&mut bits, &cavities);
+        report.count_usize("cavities_filled", cavities.n_cavities);
+        report.count_usize("cavities_filled_voxels", cavities.n_voxels);
     }
-    let mask = Mask::from_voxels(grid.clone(), &voxels);
+    let mask = Mask::new(grid.clone(), bits);
     let n_foreground = mask.n_foreground();
+    if n_foreground == 0 {
+        let what = "the mask after cleaning".to_owned();
+        return Err(Error::Empty { what, min: 0.0, max: 1.0 });
+    }
     report.count_usize("foreground_voxels", n_foreground);
     report.count("foreground_ml", millilitres(n_foreground));
     Ok(Segmented { mask, ledger, report })

@@ -1,12 +1,13 @@
 //! The voxels of the organ, by the value of each voxel alone.
 //!
-//! **Input** a volume and [`Params`]. **Output** one `bool` a voxel, x fastest, and a phrase for what was chosen.
+//! **Input** a volume and [`Params`]. **Output** one bit a voxel, and a phrase for what was chosen.
 //! **Steps** 1. where the method is `auto`, settle it by what the volume is; 2. test each voxel.
 //! **Guarantees** `auto` never guesses: it takes a volume of two values for the mask, a given label for a label,
 //! and asks otherwise. A value that is not a number is never chosen.
 
-use espalier_model::Volume;
+use espalier_model::{Bits, Volume};
 
+use crate::choose::choose;
 use crate::{Error, Kind, Method, Params, inspect_kind, region_grow};
 
 /// How many labels an error lists.
@@ -14,7 +15,7 @@ const N_LISTED: usize = 20;
 
 /// The chosen voxels, and what they are called in messages.
 pub(crate) struct Selection {
-    pub(crate) voxels: Vec<bool>,
+    pub(crate) bits: Bits,
     pub(crate) what: String,
 }
 
@@ -27,13 +28,13 @@ pub(crate) fn select(volume: &Volume, params: &Params) -> Result<Selection, Erro
             _ => Ok(select_mask(volume, 0.0)),
         },
         Method::Threshold => Ok(Selection {
-            voxels: volume.map_values(|value| (lower..=upper).contains(&value)),
+            bits: choose(volume, |value| (lower..=upper).contains(&value)),
             what: format!("the band {lower} to {upper}"),
         }),
         Method::RegionGrow => {
             let seed = region_grow::seed_voxel(volume.grid(), params)?;
-            let voxels = region_grow::grow(volume, seed, (lower, upper))?;
-            Ok(Selection { voxels, what: format!("the region in {lower} to {upper}") })
+            let bits = region_grow::grow(volume, seed, (lower, upper))?;
+            Ok(Selection { bits, what: format!("the region in {lower} to {upper}") })
         }
         // `Params::validate` refuses this method without a label.
         Method::Label => Ok(select_label(volume, params.label.unwrap_or(f64::NAN))),
@@ -41,12 +42,12 @@ pub(crate) fn select(volume: &Volume, params: &Params) -> Result<Selection, Erro
 }
 
 fn select_label(volume: &Volume, label: f64) -> Selection {
-    Selection { voxels: volume.map_values(|value| value == label), what: format!("label {label}") }
+    Selection { bits: choose(volume, |value| value == label), what: format!("label {label}") }
 }
 
 fn select_mask(volume: &Volume, background: f64) -> Selection {
-    let voxels = volume.map_values(|value| value != background && !value.is_nan());
-    Selection { voxels, what: "the mask".to_owned() }
+    let bits = choose(volume, |value| value != background && !value.is_nan());
+    Selection { bits, what: "the mask".to_owned() }
 }
 
 fn select_by_kind(volume: &Volume, label: Option<f64>) -> Result<Selection, Error> {
