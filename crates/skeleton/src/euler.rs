@@ -8,7 +8,9 @@
 //! χ₈(S)/8 = \[S ≠ ∅\] − edges/2 + faces/4 − |S|/8, where only edges and faces touched by S count.
 //! 2. Removing the centre changes the 8 vertices of its cube: δ = Σ χ₈(with it) − χ₈(without it).
 //! **Source** [Lee94] section 3: the values δ are its Table 2, generated here from the formula.
-//! **Cost** eight table look-ups.
+//! **Cost** eight table look-ups; two by [`EulerTable`], the four blocks on one side of the centre at a time.
+
+use std::sync::LazyLock;
 
 use crate::simple::CENTER;
 
@@ -54,9 +56,42 @@ pub(crate) fn euler_change(neighborhood: u32) -> i32 {
     change
 }
 
-/// Whether the Euler number stays as it is when the centre of `neighborhood` is removed.
-pub(crate) fn is_euler_invariant(neighborhood: u32) -> bool {
-    euler_change(neighborhood) == 0
+/// The change of the four blocks on one side of the centre, by the 9 bits of that side and the 8 beside the centre.
+pub(crate) struct EulerTable {
+    changes: Vec<i8>,
+}
+
+impl EulerTable {
+    /// Works the table out: 131,072 entries, under a millisecond.
+    fn new() -> Self {
+        // With the other side empty, its four blocks see the middle alone; half of that change is theirs.
+        let of_half = |half: u32| {
+            let middle = middle_from_8(half & 0xFF);
+            let change = euler_change(half >> 8 << 18 | middle << 9);
+            (change - euler_change(middle << 9) / 2) as i8
+        };
+        Self { changes: (0..1 << 17).map(of_half).collect() }
+    }
+
+    /// The table, made at the first call.
+    pub(crate) fn get() -> &'static Self {
+        static TABLE: LazyLock<EulerTable> = LazyLock::new(EulerTable::new);
+        &TABLE
+    }
+
+    /// Whether the Euler number stays as it is when the centre of `neighborhood` is removed.
+    #[inline]
+    pub(crate) fn is_invariant(&self, neighborhood: u32) -> bool {
+        // The centre is left out of the middle nine bits.
+        let middle = neighborhood >> 9 & 0xF | neighborhood >> 10 & 0xF0;
+        let [below, above] = [neighborhood & 0x1FF, neighborhood >> 18 & 0x1FF];
+        self.changes[(below << 8 | middle) as usize] == -self.changes[(above << 8 | middle) as usize]
+    }
+}
+
+/// The nine bits about the centre, without it, from the eight.
+fn middle_from_8(bits: u32) -> u32 {
+    bits & 0xF | (bits & 0xF0) << 1
 }
 
 /// The eight bits of the 2×2×2 block whose lowest voxel is bit `corner` of the neighbourhood.
@@ -100,7 +135,9 @@ mod tests {
                 (stream.next_u32() & stream.next_u32() | density & stream.next_u32()) & 0x07FF_FFFF;
             let with_center = euler_by_counting(voxels_of(neighborhood | CENTER));
             let without_center = euler_by_counting(voxels_of(neighborhood & !CENTER));
-            assert_eq!(euler_change(neighborhood), 8 * (with_center - without_center), "{neighborhood:#x}");
+            let change = with_center - without_center;
+            assert_eq!(euler_change(neighborhood), 8 * change, "{neighborhood:#x}");
+            assert_eq!(EulerTable::get().is_invariant(neighborhood), change == 0, "{neighborhood:#x}");
         }
     }
 

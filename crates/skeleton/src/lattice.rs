@@ -1,28 +1,26 @@
-//! The working volume: the mask's foreground box, turned, padded, one byte a voxel.
+//! The working volume: the mask's foreground box, turned, padded, one bit a voxel.
 //!
 //! **Input** a mask and the orientation. **Output** cells of a box, x fastest, with one layer of background
 //! around, and the way back to the mask's own voxels.
+//! **Notation** a *cell* is a voxel of the padded box by the number of its bit in the list of words; rows begin a
+//! word, so the steps to the next row and slab are multiples of 64.
 //! **Steps** 1. Bounding box. 2. Permute and flip its axes so that they point right, anterior, superior (or
-//! leave them). 3. Copy.
+//! leave them). 3. Copy, run by run.
 //! **Guarantees** cropping keeps the order of the voxels, so no result depends on empty margins.
-//! **Cost** O(box).
+//! **Cost** O(words of the mask + foreground).
 
-use espalier_model::Mask;
+use espalier_model::{Bits, Mask};
 
 use crate::params::Orientation;
 use crate::simple::CENTER;
 
-/// The cell is foreground.
-const FOREGROUND: u8 = 1;
-/// The cell carries a mark of the algorithm that runs.
-const MARK: u8 = 2;
+/// Bits in a word.
+pub(crate) const WORD: usize = u64::BITS as usize;
 
 /// A padded box of cells with the mask's foreground.
 #[derive(Clone, Debug)]
 pub(crate) struct Lattice {
-    cells: Vec<u8>,
-    /// Extents with the padding, x fastest.
-    shape: [usize; 3],
+    bits: Bits,
     /// For each of the lattice's axes: the mask's axis, and whether both point the same way.
     stored_axes: [(usize, bool); 3],
     /// First and last voxel of the box in the mask.
@@ -45,24 +43,49 @@ impl Lattice {
         let shape = stored_axes.map(|(stored, _)| high[stored] - low[stored] + 3);
         let spacing_mm = mask.grid().spacing_mm();
         let spacing = stored_axes.map(|(stored, _)| spacing_mm[stored]);
-        let cells = vec![0; shape[0] * shape[1] * shape[2]];
-        let mut lattice = Self { cells, shape, stored_axes, bounds, spacing };
-
-        for voxel in mask.voxels() {
-            let cell = lattice.cell_of(voxel);
-            lattice.cells[cell] = FOREGROUND;
-        }
+        let mut lattice = Self { bits: Bits::new(shape), stored_axes, bounds, spacing };
+        lattice.copy(mask.bits());
         Some(lattice)
     }
 
-    /// The distances in the flat cell list from a cell to its next along x, y, z.
-    pub(crate) fn strides(&self) -> [isize; 3] {
-        [1, self.shape[0] as isize, (self.shape[0] * self.shape[1]) as isize]
+    /// Copies the foreground of the box.
+    fn copy(&mut self, mask: &Bits) {
+        let (low, high) = self.bounds;
+        let ny = mask.shape()[1];
+        let x_stays_x = self.stored_axes[0].0 == 0;
+        for (z, y) in (low[2]..=high[2]).flat_map(|z| (low[1]..=high[1]).map(move |y| (z, y))) {
+            for run in mask.runs(z * ny + y) {
+                if x_stays_x {
+                    let ends = [run.start, run.end - 1].map(|x| self.coordinates_of([x, y, z]));
+                    let [_, row, slab] = ends[0];
+                    let first = ends[0][0].min(ends[1][0]);
+                    self.bits.fill_run(slab * self.shape()[1] + row, first..first + run.len());
+                } else {
+                    run.for_each(|x| self.bits.set(self.coordinates_of([x, y, z])));
+                }
+            }
+        }
     }
 
-    /// The number of cells, padding included.
-    pub(crate) fn n_cells(&self) -> usize {
-        self.cells.len()
+    /// Extents with the padding, x fastest.
+    pub(crate) fn shape(&self) -> [usize; 3] {
+        self.bits.shape()
+    }
+
+    /// The bits of the padded box.
+    pub(crate) fn bits(&self) -> &Bits {
+        &self.bits
+    }
+
+    /// The steps in the list of words from a row to the next and from a slab to the next.
+    pub(crate) fn word_strides(&self) -> [usize; 2] {
+        [self.bits.words_per_row(), self.bits.words_per_row() * self.shape()[1]]
+    }
+
+    /// The steps from a cell to its next along x, y, z.
+    pub(crate) fn strides(&self) -> [isize; 3] {
+        let [row, slab] = self.word_strides();
+        [1, (row * WORD) as isize, (slab * WORD) as isize]
     }
 
     /// The distance between neighbouring cells along x, y, z, in mm.
@@ -71,76 +94,56 @@ impl Lattice {
     }
 
     /// All foreground cells, in raster order.
-    pub(crate) fn foreground(&self) -> Vec<usize> {
-        (0..self.cells.len()).filter(|&cell| self.is_foreground(cell)).collect()
+    pub(crate) fn foreground(&self) -> impl Iterator<Item = usize> + '_ {
+        let words = self.bits.words().iter().enumerate().filter(|&(_, &bits)| bits != 0);
+        words.flat_map(|(word, &bits)| ones(bits).map(move |bit| word * WORD + bit))
     }
 
     /// The foreground as voxels of the mask, in no particular order.
     pub(crate) fn stored_voxels(&self) -> Vec<[u32; 3]> {
-        self.foreground().into_iter().map(|cell| self.stored_voxel(cell)).collect()
+        self.bits.voxels().map(|voxel| self.stored_voxel(voxel)).collect()
     }
 
     /// Whether a cell is foreground.
     pub(crate) fn is_foreground(&self, cell: usize) -> bool {
-        self.cells[cell] & FOREGROUND != 0
+        self.bits.words()[cell / WORD] >> (cell % WORD) & 1 != 0
     }
 
-    /// Turns a cell into foreground, without a mark.
+    /// Turns a cell into foreground.
     pub(crate) fn add(&mut self, cell: usize) {
-        self.cells[cell] = FOREGROUND;
+        self.bits.words_mut()[cell / WORD] |= 1 << (cell % WORD);
     }
 
-    /// Turns a foreground cell into background, without a mark.
+    /// Turns a cell into background.
     pub(crate) fn delete(&mut self, cell: usize) {
-        self.cells[cell] = 0;
+        self.bits.words_mut()[cell / WORD] &= !(1 << (cell % WORD));
     }
 
-    /// Whether a cell is marked.
-    pub(crate) fn is_marked(&self, cell: usize) -> bool {
-        self.cells[cell] & MARK != 0
-    }
-
-    /// Marks a cell.
-    pub(crate) fn mark(&mut self, cell: usize) {
-        self.cells[cell] |= MARK;
-    }
-
-    /// Takes a cell's mark away.
-    pub(crate) fn unmark(&mut self, cell: usize) {
-        self.cells[cell] &= !MARK;
-    }
-
-    /// Whether one of the six face neighbours of a foreground cell is background.
-    pub(crate) fn is_border(&self, cell: usize) -> bool {
-        self.strides().iter().any(|&stride| {
-            !self.is_foreground(cell.wrapping_add_signed(stride))
-                || !self.is_foreground(cell.wrapping_add_signed(-stride))
-        })
-    }
-
-    /// The 3×3×3 neighbourhood of a foreground cell: bit 9·(dz+1) + 3·(dy+1) + (dx+1).
+    /// The 3×3×3 neighbourhood of a cell inside the padding: bit 9·(dz+1) + 3·(dy+1) + (dx+1).
+    #[inline]
     pub(crate) fn neighborhood(&self, cell: usize) -> u32 {
-        let [_, row, slab] = self.strides().map(isize::unsigned_abs);
+        let words = self.bits.words();
+        let [row, slab] = self.word_strides();
+        // The padding makes every neighbour a cell, and all nine lines of three begin at the same bit.
+        let (first, bit) = ((cell - 1) / WORD - slab - row, (cell - 1) % WORD);
+        let is_split = bit > WORD - 3;
         let mut bits = 0;
-        // The padding makes every neighbour of a foreground cell a cell.
-        let first = cell - slab - row - 1;
-        for (line, start) in (0..9).map(|line| (line, first + line / 3 * slab + line % 3 * row)) {
-            let cells = &self.cells[start..start + 3];
-            let three = cells[0] & FOREGROUND | (cells[1] & FOREGROUND) << 1 | (cells[2] & FOREGROUND) << 2;
-            bits |= u32::from(three) << (3 * line);
+        for line in 0..9 {
+            let word = first + line / 3 * slab + line % 3 * row;
+            let mut three = words[word] >> bit;
+            if is_split {
+                three |= words[word + 1] << (WORD - bit);
+            }
+            bits |= (three as u32 & 7) << (3 * line);
         }
         bits
     }
 
     /// The foreground neighbours of a cell among the 26, in raster order.
     pub(crate) fn neighbors(&self, cell: usize) -> impl Iterator<Item = usize> + use<> {
-        let mut bits = self.neighborhood(cell) & !CENTER;
         let strides = self.strides();
-        std::iter::from_fn(move || {
-            let bit = (bits != 0).then(|| bits.trailing_zeros())?;
-            bits &= bits - 1;
-            Some(cell.wrapping_add_signed(offset(bit, strides)))
-        })
+        let bits = u64::from(self.neighborhood(cell) & !CENTER);
+        ones(bits).map(move |bit| cell.wrapping_add_signed(offset(bit, strides)))
     }
 
     /// All 26 cells around a foreground cell, in raster order.
@@ -151,29 +154,25 @@ impl Lattice {
             .map(move |bit| cell.wrapping_add_signed(offset(bit, strides)))
     }
 
-    /// The parity class of a cell, 0..8: two cells of one class are never 26-neighbours.
-    pub(crate) fn parity(&self, cell: usize) -> usize {
-        let [x, y, z] = self.coordinates(cell);
-        (z & 1) << 2 | (y & 1) << 1 | x & 1
-    }
-
     /// The coordinates x, y, z of a cell, padding included.
     pub(crate) fn coordinates(&self, cell: usize) -> [usize; 3] {
-        [cell % self.shape[0], cell / self.shape[0] % self.shape[1], cell / (self.shape[0] * self.shape[1])]
+        let [row_words, slab_words] = self.word_strides();
+        let word = cell / WORD;
+        [word % row_words * WORD + cell % WORD, word / row_words % self.shape()[1], word / slab_words]
     }
 
-    fn cell_of(&self, stored: [usize; 3]) -> usize {
+    /// Where a voxel of the mask lies in the padded box.
+    fn coordinates_of(&self, stored: [usize; 3]) -> [usize; 3] {
         let (low, high) = self.bounds;
-        let [x, y, z] = self.stored_axes.map(|(axis, same_way)| {
+        self.stored_axes.map(|(axis, same_way)| {
             1 + if same_way { stored[axis] - low[axis] } else { high[axis] - stored[axis] }
-        });
-        (z * self.shape[1] + y) * self.shape[0] + x
+        })
     }
 
-    fn stored_voxel(&self, cell: usize) -> [u32; 3] {
+    fn stored_voxel(&self, coordinates: [usize; 3]) -> [u32; 3] {
         let (low, high) = self.bounds;
         let mut stored = [0; 3];
-        for (coordinate, (axis, same_way)) in self.coordinates(cell).into_iter().zip(self.stored_axes) {
+        for (coordinate, (axis, same_way)) in coordinates.into_iter().zip(self.stored_axes) {
             let value = if same_way { low[axis] + coordinate - 1 } else { high[axis] + 1 - coordinate };
             stored[axis] = value as u32;
         }
@@ -181,8 +180,17 @@ impl Lattice {
     }
 }
 
-/// The way in the flat cell list to the neighbour at a bit of the neighbourhood.
-fn offset(bit: u32, strides: [isize; 3]) -> isize {
+/// The places of the ones in a word, from the lowest.
+pub(crate) fn ones(mut bits: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = (bits != 0).then(|| bits.trailing_zeros() as usize)?;
+        bits &= bits - 1;
+        Some(bit)
+    })
+}
+
+/// The way from a cell to the neighbour at a bit of the neighbourhood.
+fn offset(bit: usize, strides: [isize; 3]) -> isize {
     let digits = [bit % 3, bit / 3 % 3, bit / 9];
     (0..3).map(|axis| (digits[axis] as isize - 1) * strides[axis]).sum()
 }

@@ -32,13 +32,14 @@ pub(crate) fn is_endpoint(neighborhood: u32) -> bool {
 pub(crate) fn is_simple(neighborhood: u32) -> bool {
     let neighbors = neighborhood & !CENTER;
     let mut reached = neighbors & neighbors.wrapping_neg();
-    loop {
+    while reached != neighbors {
         let grown = grow(reached) & neighbors;
         if grown == reached {
-            return reached == neighbors;
+            return false;
         }
         reached = grown;
     }
+    true
 }
 
 /// A set of bits and all their 26 neighbours inside the 3×3×3 block.

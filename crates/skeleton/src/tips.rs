@@ -11,7 +11,7 @@
 //! to there; along a spur the depth falls outward, so it stays as it is.
 //! **Cost** O(ends).
 
-use crate::depth::UNITS_PER_SPACING;
+use crate::depth::{Depths, UNITS_PER_SPACING};
 use crate::lattice::Lattice;
 use crate::simple::{is_endpoint, n_neighbors};
 
@@ -26,14 +26,13 @@ const HEADING_VOXELS: usize = 4;
 const MIN_COSINE: f64 = 0.5;
 
 /// Prolongs all tips; returns the number of voxels added.
-pub(crate) fn regrow(lattice: &mut Lattice, depths: &[u16]) -> usize {
+pub(crate) fn regrow(lattice: &mut Lattice, depths: &Depths) -> usize {
     let mut n_added = 0;
-    for tip in lattice.foreground() {
-        if !is_endpoint(lattice.neighborhood(tip)) {
-            continue;
-        }
+    let tips: Vec<usize> =
+        lattice.foreground().filter(|&cell| is_endpoint(lattice.neighborhood(cell))).collect();
+    for tip in tips {
         let Some(heading) = heading(lattice, tip) else { continue };
-        let least_depth = f64::from(depths[tip]) - LEEWAY * UNITS_PER_SPACING;
+        let least_depth = f64::from(depths.at(tip)) - LEEWAY * UNITS_PER_SPACING;
         let mut end = tip;
         for _ in 0..MAX_VOXELS {
             let Some(next) = continuation(lattice, depths, end, heading, least_depth) else { break };
@@ -74,7 +73,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// The voxel that best prolongs the curve beyond `end`.
 fn continuation(
     lattice: &Lattice,
-    depths: &[u16],
+    depths: &Depths,
     end: usize,
     heading: [f64; 3],
     least_depth: f64,
@@ -82,11 +81,13 @@ fn continuation(
     lattice
         .surroundings(end)
         .filter(|&cell| {
-            let is_mask = depths[cell] > 0 && !lattice.is_foreground(cell);
-            is_mask && f64::from(depths[cell]) >= least_depth && n_neighbors(lattice.neighborhood(cell)) == 1
+            let is_mask = depths.at(cell) > 0 && !lattice.is_foreground(cell);
+            is_mask
+                && f64::from(depths.at(cell)) >= least_depth
+                && n_neighbors(lattice.neighborhood(cell)) == 1
         })
         .filter_map(|cell| direction(lattice, end, cell).map(|step| (cell, dot(step, heading))))
         .filter(|&(_, cosine)| cosine >= MIN_COSINE)
-        .max_by(|a, b| depths[a.0].cmp(&depths[b.0]).then(a.1.total_cmp(&b.1)).then(b.0.cmp(&a.0)))
+        .max_by(|a, b| depths.at(a.0).cmp(&depths.at(b.0)).then(a.1.total_cmp(&b.1)).then(b.0.cmp(&a.0)))
         .map(|(cell, _)| cell)
 }
