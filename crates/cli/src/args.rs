@@ -84,7 +84,7 @@ pub(crate) enum Command {
 /// `espalier run`.
 #[derive(Debug, Args)]
 pub(crate) struct RunArguments {
-    /// A config (.toml), or an input: .nii, .nii.gz, .swc
+    /// A config (.toml), or an input: a volume (.nii, .nii.gz, .hdr, .nrrd, .nhdr, .mha, .mhd) or a traced tree (.swc)
     pub(crate) config_or_input: PathBuf,
     /// The run folder [default: out/NAME]
     #[arg(short, long, value_name = "DIR")]
@@ -136,7 +136,7 @@ Examples:
 #[derive(Debug, Args)]
 #[command(after_help = SWEEP_HELP)]
 pub(crate) struct SweepArguments {
-    /// A config (.toml), or an input: .nii, .nii.gz, .swc
+    /// A config (.toml), or an input: a volume (.nii, .nii.gz, .hdr, .nrrd, .nhdr, .mha, .mhd) or a traced tree (.swc)
     pub(crate) config_or_input: PathBuf,
     /// A key and its values; may be given many times, for all combinations
     #[arg(long = "over", value_name = "KEY=V1,V2,…", required = true, value_parser = parse_axis)]

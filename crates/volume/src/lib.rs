@@ -4,7 +4,9 @@
 //! |---|---|
 //! | bytes of a file, decompressed and bounded | `source` |
 //! | what all formats come to: header read, voxels still in the file | `stored`, `scalar` |
-//! | NIfTI-1: the 348 bytes of the header, checked; the affine ladder | `nifti/header`, `nifti/affine` |
+//! | which format a file has | `recognise` |
+//! | NIfTI-1 and -2: the header, checked; the affine ladder; pairs of files | `nifti/*` |
+//! | NRRD and MetaImage: headers of text, data files, numbers written out | `nrrd/*`, `metaimage`, `text`, `ascii`, `detached` |
 //! | stored numbers of any type and byte order | `decode` |
 //! | sheared axes to orthogonal ones | `orthogonal` |
 //! | **[`read`]**: file → [`Volume`](espalier_model::Volume) | `read` |
@@ -21,11 +23,19 @@
 //! **Architecture Invariant:** this is the only stage that reads files, and it writes none. No byte of a file
 //! makes it panic, recurse, or hold more than the limit that the caller states.
 
+mod gzip;
+mod recognise;
 mod scalar;
 mod source;
 mod stored;
 
+mod ascii;
+mod detached;
+mod text;
+
+mod metaimage;
 mod nifti;
+mod nrrd;
 
 mod decode;
 mod orthogonal;

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use espalier_model::diagnose::ParamError;
+use glam::DVec3;
 use serde::de::{self, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -28,7 +29,8 @@ impl Default for ReadOptions {
     }
 }
 
-/// The voxel axes of a file that does not state them: where x, y and z point. Voxel (0, 0, 0) is the origin.
+/// The space of a file that does not name it: where its axes x, y and z point in the body. Without directions of
+/// their own the voxel axes are these, and voxel (0, 0, 0) is the origin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AssumedSpace {
@@ -36,8 +38,19 @@ pub enum AssumedSpace {
     Ras,
     /// Left, anterior, superior: what ANALYZE files were mostly meant as, and how several programs read them.
     Las,
-    /// Left, posterior, superior: the axes of DICOM.
+    /// Left, posterior, superior: the axes of DICOM, ITK and most NRRD files.
     Lps,
+}
+
+impl AssumedSpace {
+    /// For each axis 1 where it points along R, A or S, -1 where it points against it.
+    pub(crate) fn ras_signs(self) -> DVec3 {
+        match self {
+            Self::Ras => DVec3::new(1.0, 1.0, 1.0),
+            Self::Las => DVec3::new(-1.0, 1.0, 1.0),
+            Self::Lps => DVec3::new(-1.0, -1.0, 1.0),
+        }
+    }
 }
 
 /// How a volume becomes a mask.

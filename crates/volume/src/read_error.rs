@@ -1,5 +1,7 @@
 //! What is wrong with a file.
 
+use std::path::PathBuf;
+
 use espalier_model::diagnose::Class;
 use espalier_model::{Diagnose, GridError};
 use glam::DVec3;
@@ -50,7 +52,7 @@ pub enum ReadError {
         cause: String,
     },
     /// More data after the voxels than any program writes.
-    #[error("more than {limit} bytes follow the voxels")]
+    #[error("more bytes follow the voxels than the {limit} that may")]
     Trailing {
         /// How many are let pass.
         limit: u64,
@@ -70,17 +72,51 @@ pub enum ReadError {
         needed: u64,
     },
     /// Not a file of a known format.
-    #[error("not a NIfTI-1 file: {what}")]
+    #[error("not a volume that can be read: this is {what}")]
     Format {
         /// What it looks like.
         what: &'static str,
         /// What to do.
-        way_out: &'static str,
+        way_out: String,
+    },
+    /// A header of text that goes on and on.
+    #[error("the header is longer than {limit} bytes")]
+    Header {
+        /// How long a header may be.
+        limit: usize,
+    },
+    /// A header that names a data file outside its folder.
+    #[error("the header names the data file {written:?}, which is not in its folder")]
+    Escape {
+        /// The name as written.
+        written: String,
+    },
+    /// Voxels in more than one file.
+    #[error("the header spreads its voxels over several files: {written:?}")]
+    SeveralFiles {
+        /// What it says.
+        written: String,
+    },
+    /// One of two files that belong together.
+    #[error("this is {what}; there is none beside it {name}")]
+    NoPartner {
+        /// What it is.
+        what: &'static str,
+        /// How the other is called.
+        name: &'static str,
+    },
+    /// A fault of the file that holds the voxels of a header.
+    #[error("in its data file {}: {problem}", .path.display())]
+    Detached {
+        /// What is wrong with it.
+        problem: Box<ReadError>,
+        /// The data file.
+        path: PathBuf,
     },
     /// A header field out of its range.
     #[error("header field {field} is {found}, expected {expected}")]
     Field {
-        /// The name of the field in the NIfTI-1 standard.
+        /// The name of the field in the format's own words.
         field: &'static str,
         /// What stands there.
         found: String,
@@ -88,12 +124,12 @@ pub enum ReadError {
         expected: &'static str,
     },
     /// A type of numbers that is no scalar.
-    #[error("the voxels are {what} (datatype {code}), espalier reads real numbers of 8 to 64 bits")]
+    #[error("the voxels are {what} ({stated}), espalier reads real numbers of 8 to 64 bits")]
     NotScalar {
         /// What they are.
         what: &'static str,
-        /// The number in the header.
-        code: i16,
+        /// What the header says.
+        stated: String,
     },
     /// A series of volumes.
     #[error("the file holds {n_volumes} volumes")]
@@ -111,13 +147,14 @@ pub enum ReadError {
     },
     /// The file does not say how it lies in space.
     #[error(
-        "neither sform nor qform is set: by the NIfTI-1 standard the axes of these {:.4} x {:.4} x {:.4} mm voxels \
-         are RAS, many programs read LAS, which mirrors left and right",
+        "the header does not say how its {:.4} x {:.4} x {:.4} mm voxels lie in the body: {readings}",
         .spacing_mm.x, .spacing_mm.y, .spacing_mm.z
     )]
     NoSpace {
-        /// The voxel's size by `pixdim`.
+        /// The voxel's size.
         spacing_mm: DVec3,
+        /// What is missing, and what programs make of it.
+        readings: &'static str,
     },
     /// The numbers that place the volume in space are no legal transform.
     #[error("the {form} is not usable: {problem}")]
@@ -137,6 +174,16 @@ pub enum ReadError {
     },
 }
 
+impl ReadError {
+    /// The fault itself, whichever file it is in.
+    pub(crate) fn innermost(&self) -> &Self {
+        match self {
+            Self::Detached { problem, .. } => problem.innermost(),
+            other => other,
+        }
+    }
+}
+
 impl Diagnose for ReadError {
     fn code(&self) -> &'static str {
         match self {
@@ -149,6 +196,11 @@ impl Diagnose for ReadError {
             Self::TooLarge { .. } => "E-VOLUME-TOO-LARGE",
             Self::NoMemory { .. } => "E-VOLUME-NO-MEMORY",
             Self::Format { .. } => "E-VOLUME-FORMAT",
+            Self::Header { .. } => "E-VOLUME-HEADER",
+            Self::Escape { .. } => "E-VOLUME-ESCAPE",
+            Self::SeveralFiles { .. } => "E-VOLUME-SEVERAL-FILES",
+            Self::NoPartner { .. } => "E-VOLUME-NO-PARTNER",
+            Self::Detached { problem, .. } => problem.code(),
             Self::Field { .. } => "E-VOLUME-FIELD",
             Self::NotScalar { .. } => "E-VOLUME-DATATYPE",
             Self::FourDimensional { .. } => "E-VOLUME-4D",
@@ -165,6 +217,7 @@ impl Diagnose for ReadError {
             Self::Io(_) | Self::NotAFile { .. } => Class::Io,
             Self::TooLarge { .. } | Self::NoMemory { .. } => Class::Limit,
             Self::VolumeIndex { .. } => Class::Usage,
+            Self::Detached { problem, .. } => problem.class(),
             _ => Class::Input,
         }
     }
@@ -175,7 +228,7 @@ impl Diagnose for ReadError {
                 "check the path; input.path is relative to the config file"
             }
             Self::Io(_) => "check the permissions and the disk",
-            Self::NotAFile { .. } => "give the .nii or .nii.gz file itself",
+            Self::NotAFile { .. } => "give the file of the volume itself",
             Self::Empty | Self::Truncated { .. } | Self::Overdeclared { .. } | Self::Corrupt { .. } => {
                 "the copy or download was not completed: fetch the file again"
             }
@@ -183,6 +236,11 @@ impl Diagnose for ReadError {
             Self::NoMemory { .. } => "crop or resample the volume, or use a larger machine",
             Self::TooLarge { .. } => "allow more with --max-memory, or crop or resample the volume",
             Self::Format { way_out, .. } => way_out,
+            Self::Header { .. } => "check that this is the file of a volume",
+            Self::Escape { .. } => "put the data file beside the header, and its bare name into the header",
+            Self::SeveralFiles { .. } => "convert the volume to one file, .nrrd, .mha or .nii.gz",
+            Self::NoPartner { .. } => "put both files of the pair into one folder, or convert them to one .nii.gz",
+            Self::Detached { problem, .. } => return problem.hint(),
             Self::Field { .. } => "write the file again with a program that checks its headers",
             Self::NotScalar { .. } => "convert the volume to one number a voxel",
             Self::FourDimensional { .. } => "choose one, counted from 0: `--set input.volume_index=0`, or `volume_index = 0` under [input]",

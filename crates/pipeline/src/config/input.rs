@@ -54,8 +54,8 @@ impl Unit {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Input {
-    /// A volume (`.nii`, `.nii.gz`) or a traced tree (`.swc`). Relative to the config's folder;
-    /// `$ESPALIER_DATA` at its beginning is expanded.
+    /// A volume (NIfTI, NRRD, MetaImage: `.nii`, `.nii.gz`, `.hdr`, `.nrrd`, `.nhdr`, `.mha`, `.mhd`) or a traced
+    /// tree (`.swc`). Relative to the config's folder; `$ESPALIER_DATA` at its beginning is expanded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub path: Option<String>,
     /// Instead of a file: the phantom to make; `[phantom]` has its shape.

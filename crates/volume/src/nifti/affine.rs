@@ -5,14 +5,17 @@
 //! 3. else the space that the caller assumes; 4. else an error that says how others would read the file. Where
 //! sform and qform are both set and disagree, the sform is used, and a warning records both.
 //! **Guarantees** the numbers are finite. That they make a grid is checked by [`Grid`](espalier_model::Grid).
-//! **Source** `nifti1.h`: methods 1 to 3 of orienting a volume, and quaternions to rotations.
+//! **Source** `nifti1.h` and `nifti2.h`: methods 1 to 3 of orienting a volume, and quaternions to rotations.
 
 use espalier_model::Report;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
-use nifti::NiftiHeader;
 
+use super::fields::Fields;
 use crate::{AssumedSpace, ReadError};
 
+/// What is made of a header without a place.
+const READINGS: &str = "neither sform nor qform is set; by the NIfTI standard the axes are then RAS, many programs \
+                        read LAS, which mirrors left and right";
 /// Two affines that put no corner of the volume farther apart than this are the same.
 const AGREE_MM: f64 = 0.01;
 /// How far b² + c² + d² may exceed 1 by rounding in other programs.
@@ -22,7 +25,7 @@ const MIN_REAL_SQUARED: f64 = 1e-7;
 
 /// The affine, and the name of the fields that it comes from.
 pub(crate) fn world_from_voxel(
-    fields: &NiftiHeader,
+    fields: &Fields,
     shape: [usize; 3],
     unit_mm: f64,
     assumed: Option<AssumedSpace>,
@@ -44,20 +47,13 @@ pub(crate) fn world_from_voxel(
         return Ok((in_mm(qform(fields)?), "qform"));
     }
     let spacing_mm = pixdim("pixdim", fields)? * unit_mm;
-    let signs = match assumed {
-        None => return Err(ReadError::NoSpace { spacing_mm }),
-        Some(AssumedSpace::Ras) => DVec3::new(1.0, 1.0, 1.0),
-        Some(AssumedSpace::Las) => DVec3::new(-1.0, 1.0, 1.0),
-        Some(AssumedSpace::Lps) => DVec3::new(-1.0, -1.0, 1.0),
-    };
+    let signs = assumed.ok_or(ReadError::NoSpace { spacing_mm, readings: READINGS })?.ras_signs();
     report.warn("W-VOLUME-ASSUMED-SPACE", "neither sform nor qform is set: the axes are as assumed");
     Ok((DAffine3::from_mat3(DMat3::from_diagonal(spacing_mm * signs)), "pixdim"))
 }
 
-fn sform(fields: &NiftiHeader) -> Result<DAffine3, ReadError> {
-    let row = |srow: &[f32; 4]| srow.map(f64::from);
-    let (x, y, z) = (row(&fields.srow_x), row(&fields.srow_y), row(&fields.srow_z));
-    let column = |i: usize| DVec3::new(x[i], y[i], z[i]);
+fn sform(fields: &Fields) -> Result<DAffine3, ReadError> {
+    let column = |i: usize| DVec3::from_array(fields.srow.map(|row| row[i]));
     let affine = DAffine3::from_cols(column(0), column(1), column(2), column(3));
     if affine.is_finite() {
         Ok(affine)
@@ -66,11 +62,11 @@ fn sform(fields: &NiftiHeader) -> Result<DAffine3, ReadError> {
     }
 }
 
-fn qform(fields: &NiftiHeader) -> Result<DAffine3, ReadError> {
+fn qform(fields: &Fields) -> Result<DAffine3, ReadError> {
     let fault = |problem: String| ReadError::Form { form: "qform", problem };
     let spacing = pixdim("qform", fields)?;
-    let [b, c, d] = [fields.quatern_b, fields.quatern_c, fields.quatern_d].map(f64::from);
-    let origin = DVec3::new(fields.quatern_x.into(), fields.quatern_y.into(), fields.quatern_z.into());
+    let [b, c, d] = fields.quatern;
+    let origin = DVec3::from_array(fields.qoffset);
     let imaginary_squared = b * b + c * c + d * d;
     if !origin.is_finite() || !imaginary_squared.is_finite() {
         return Err(fault("it holds a number that is not finite".to_owned()));
@@ -88,8 +84,8 @@ fn qform(fields: &NiftiHeader) -> Result<DAffine3, ReadError> {
 }
 
 /// The voxel's size by `pixdim`, in the file's unit.
-fn pixdim(form: &'static str, fields: &NiftiHeader) -> Result<DVec3, ReadError> {
-    let spacing = DVec3::new(fields.pixdim[1].into(), fields.pixdim[2].into(), fields.pixdim[3].into());
+fn pixdim(form: &'static str, fields: &Fields) -> Result<DVec3, ReadError> {
+    let spacing = DVec3::new(fields.pixdim[1], fields.pixdim[2], fields.pixdim[3]);
     if spacing.is_finite() && spacing.min_element() > 0.0 {
         return Ok(spacing);
     }
@@ -100,7 +96,7 @@ fn pixdim(form: &'static str, fields: &NiftiHeader) -> Result<DVec3, ReadError> 
 fn warn_if_forms_disagree(
     sform: &DAffine3,
     qform: &Result<DAffine3, ReadError>,
-    fields: &NiftiHeader,
+    fields: &Fields,
     shape: [usize; 3],
     report: &mut Report,
 ) {
@@ -132,12 +128,12 @@ fn warn_if_forms_disagree(
     }
 }
 
-/// The angle by which a rotation may be off because b, c and d are stored in single precision and a is computed
+/// The angle by which a rotation may be off because b, c and d are stored in few digits and a is computed
 /// from them: near half a turn a is small, and the error of its square weighs heavily.
-fn quaternion_rounding(fields: &NiftiHeader) -> f64 {
-    let [b, c, d] = [fields.quatern_b, fields.quatern_c, fields.quatern_d].map(f64::from);
+fn quaternion_rounding(fields: &Fields) -> f64 {
+    let [b, c, d] = fields.quatern;
     let real = (1.0 - b * b - c * c - d * d).max(MIN_REAL_SQUARED).sqrt();
-    2.0 * f64::from(f32::EPSILON) / real
+    2.0 * fields.precision / real
 }
 
 fn shown(affine: &DAffine3) -> String {
@@ -147,10 +143,10 @@ fn shown(affine: &DAffine3) -> String {
 }
 
 /// The sform decides, but programs that take the spacing from `pixdim` would see another volume.
-fn warn_if_pixdim_disagrees(affine: &DAffine3, fields: &NiftiHeader, unit_mm: f64, report: &mut Report) {
+fn warn_if_pixdim_disagrees(affine: &DAffine3, fields: &Fields, unit_mm: f64, report: &mut Report) {
     let axes = affine.matrix3;
     let lengths = [axes.x_axis.length(), axes.y_axis.length(), axes.z_axis.length()];
-    let stated = [1, 2, 3].map(|axis| f64::from(fields.pixdim[axis]) * unit_mm);
+    let stated = [1, 2, 3].map(|axis| fields.pixdim[axis] * unit_mm);
     let agrees = (0..3).all(|axis| (lengths[axis] - stated[axis]).abs() <= 1e-3 * lengths[axis]);
     if !agrees {
         let [x, y, z] = lengths;
