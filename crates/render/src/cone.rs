@@ -149,6 +149,16 @@ impl Cone {
         (bounds.x * bounds.y).min(along * 2.0 * wide)
     }
 
+    /// About how many pixels of a box (low and high corner) the cone looks at when it is `margin` wider.
+    pub(crate) fn area_within(&self, (low, high): (Vec2, Vec2), margin: f32) -> f64 {
+        let (own_low, own_high) = self.bounds();
+        let shared = (own_high + margin).min(high) - (own_low - margin).max(low);
+        let shared = shared.max(Vec2::ZERO).as_dvec2();
+        let wide = 2.0 * f64::from(self.radii[0].max(self.radii[1]) + margin);
+        let along = f64::from(self.range[1] - self.range[0]).min(shared.length());
+        (shared.x * shared.y).min(along * wide)
+    }
+
     /// The pixels x of a row at height `y` that the cone can reach when it is `margin` wider: low and high.
     pub(crate) fn span(&self, y: f32, margin: f32) -> Option<(f32, f32)> {
         let (low, high) = self.bounds();

@@ -18,25 +18,32 @@
 //! | `loss.length` | length loss of the edge, 0.01 = 1 % | |
 //!
 //! Everywhere that `A` is 0, ids are −1 and all else is 0.
-//! **Guarantees** the same bytes for any number of threads: the writer works in order on the calling thread.
+//! **Guarantees** the same bytes for any number of threads: blocks are compressed in parallel and written in order.
 //! **Source** OpenEXR 2 scan-line files.
 
 use std::io::Cursor;
 
 use espalier_model::{Branches, Embedding, Tree};
 use exr::block::lines::LineRefMut;
+use exr::block::writer::ChunksWriter;
+use exr::block::{BlockIndex, UncompressedBlock};
 use exr::image::write::WritableImage;
+use exr::image::write::layers::{LayersWriter, WritableLayers};
 use exr::image::write::samples::{SamplesWriter, WritableSamples};
 use exr::image::{AnyChannel, AnyChannels, Blocks, Encoding, Image, Layer};
 use exr::math::{RoundingMode, Vec2};
 use exr::meta::attribute::{LevelMode, LineOrder, SampleType, Text};
 use exr::meta::header::{Header, LayerAttributes};
+use rayon::prelude::*;
 
 use crate::Error;
 use crate::coloring::{angle_loss_deg, length_loss};
 use crate::page::Page;
 use crate::palette::linear_from_srgb;
 use crate::raster::Pixel;
+
+/// Blocks of 16 lines in memory at a time, some 4 MB each on the largest pages.
+const BLOCKS_AT_ONCE: usize = 64;
 
 /// What a channel holds at a covered pixel.
 type Read = fn(&Layers<'_>, &Pixel) -> f32;
@@ -127,8 +134,25 @@ impl<'a> Layers<'a> {
             ..LayerAttributes::default()
         };
         let layer = Layer::new(Vec2(self.size[0], self.size[1]), attributes, encoding, AnyChannels { list });
+        let image = Image::from_layer(layer);
+        let headers = image.write().infer_meta_data();
+        let rows = image.layer_data.create_writer(&headers);
         let mut bytes = Cursor::new(Vec::new());
-        Image::from_layer(layer).write().non_parallel().to_buffered(&mut bytes)?;
+        exr::block::write(&mut bytes, headers, true, |meta, writer| {
+            let blocks: Vec<_> = exr::block::enumerate_ordered_header_block_indices(&meta.headers).collect();
+            let compressed = |&(place, index): &(usize, BlockIndex)| {
+                let data = rows.extract_uncompressed_block(&meta.headers, index);
+                Ok((place, UncompressedBlock { index, data }.compress_to_chunk(&meta.headers)?))
+            };
+            // In groups, so that few blocks wait uncompressed.
+            for group in blocks.chunks(BLOCKS_AT_ONCE) {
+                let chunks: Vec<_> = group.par_iter().map(compressed).collect::<exr::error::Result<_>>()?;
+                for (place, chunk) in chunks {
+                    writer.write_chunk(place, chunk)?;
+                }
+            }
+            Ok(())
+        })?;
         Ok(bytes.into_inner())
     }
 

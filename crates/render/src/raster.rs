@@ -12,7 +12,7 @@
 //! **Guarantees** the same bytes for any number of threads: a band of tiles is one task, and inside a tile cones
 //! come in preorder.
 //! **Source** section 4.1 of [Hu2022]; the blending is ours.
-//! **Cost** O(S² · sum of the cones' areas + E) time, 32 bytes a pixel. [`layers`] tells that sum beforehand.
+//! **Cost** O(S² · sum of the cones' areas + E) time, S = 1 where a tile is crowded; 32 bytes a pixel. [`layers`] tells that sum beforehand.
 
 use std::ops::RangeInclusive;
 
@@ -23,13 +23,13 @@ use crate::cone::Cone;
 use crate::kinship::Kinship;
 use crate::palette::{PageColors, Palette};
 use crate::params::Style;
-use crate::samples::{GAP_PX, Samples};
+use crate::samples::{Detail, GAP_PX, Samples};
 
 /// Samples per pixel and axis; odd, so that one sample is the pixel's centre.
 pub(crate) const SAMPLES: usize = 3;
 /// Pixels per tile and axis.
-const TILE: usize = 32;
-/// Samples per tile and axis.
+pub(crate) const TILE: usize = 32;
+/// The most samples per tile and axis.
 pub(crate) const TILE_SAMPLES: usize = TILE * SAMPLES;
 /// What an edge of a few pixels may take, in pixels, without being counted: however many they are, they must be drawn.
 const SLENDER_PX: f64 = 256.0;
@@ -133,7 +133,8 @@ pub(crate) fn rasterise(job: &Job<'_>) -> Vec<Pixel> {
             if list.is_empty() {
                 continue;
             }
-            samples.draw(job, list, Vec2::new((tile_x * TILE) as f32, (tile_y * TILE) as f32));
+            let origin = Vec2::new((tile_x * TILE) as f32, (tile_y * TILE) as f32);
+            samples.draw(job, list, origin, detail(job, list, origin));
             let columns = tile_x * TILE..((tile_x + 1) * TILE).min(width);
             for (row, line) in band.chunks_mut(width).enumerate() {
                 for (column, pixel) in line[columns.clone()].iter_mut().enumerate() {
@@ -143,6 +144,13 @@ pub(crate) fn rasterise(job: &Job<'_>) -> Vec<Pixel> {
         }
     });
     pixels
+}
+
+/// How carefully a tile can be drawn: where ten thousand branches leave one root, all are in the tiles around it.
+fn detail(job: &Job<'_>, list: &[u32], origin: Vec2) -> Detail {
+    let corners = (origin, origin + TILE as f32);
+    let area = |&index: &u32| job.drawn[index as usize].cone.area_within(corners, GAP_PX);
+    Detail::for_layers(list.iter().map(area).sum::<f64>() / (TILE * TILE) as f64)
 }
 
 /// Which edges touch which tile.

@@ -1,18 +1,23 @@
 //! The samples of one tile: which cone is highest, and how its neighbours blend with it.
 //!
 //! **Input** the cones of a tile in preorder. **Output** the tile's pixels.
-//! **Steps** 2 to 5 of [`crate::raster`].
+//! **Steps** 2 to 5 of [`crate::raster`], in the [`Detail`] that the tile can afford.
 //! **Guarantees** sums run in preorder of the cones, so the bytes do not depend on threads.
+
+use std::ops::Range;
 
 use glam::{Vec2, Vec3};
 
 use crate::cone::{Cone, Hit};
 use crate::palette::{Rgb, to_byte};
-use crate::raster::{Drawn, Job, NOTHING, Pixel, SAMPLES, TILE_SAMPLES};
+use crate::raster::{Drawn, Job, NOTHING, Pixel, SAMPLES, TILE, TILE_SAMPLES};
 use crate::shade::{self, Place};
 
-/// A sample this far outside an outline is still partly covered: half a sample.
-const FRINGE_PX: f32 = 0.5 / SAMPLES as f32;
+/// Tiles that cones cover more often than this get one sample a pixel. Organs at their true widths stay below: no
+/// pixel of the airway, vessel and neuron phantoms' pictures changes by it.
+const FINE_LAYERS: f64 = 12.0;
+/// Beyond this nobody can see what blends with what.
+const COARSE_LAYERS: f64 = 24.0;
 /// Cones that end lower than this share of the radius below the highest have no say in the normal.
 const BLEND_SHARE: f32 = 0.7;
 /// Two cones blend if the path between them is at most this many of their radii.
@@ -39,9 +44,9 @@ impl Best {
         Self { hit: Hit::default(), index: NOTHING, outside: f32::INFINITY, n_near: 0 }
     }
 
-    fn offer(&mut self, index: u32, hit: Hit) {
+    fn offer(&mut self, index: u32, hit: Hit, fringe_px: f32) {
         self.n_near += 1;
-        if hit.outside > FRINGE_PX {
+        if hit.outside > fringe_px {
             return;
         }
         if self.index == NOTHING || hit.z > self.hit.z {
@@ -72,8 +77,70 @@ impl Blend {
     }
 }
 
+/// How carefully a tile is drawn: each layer of cones costs as much as the first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Detail {
+    /// [`SAMPLES`]² samples a pixel, neighbours blended.
+    Fine,
+    /// One sample a pixel, neighbours blended. Outlines stay smooth: coverage follows from their distance.
+    Coarse,
+    /// One sample a pixel, the highest cone alone.
+    Plain,
+}
+
+impl Detail {
+    /// For a tile whose cones cover it so many times over.
+    pub(crate) fn for_layers(n_layers: f64) -> Self {
+        match n_layers {
+            n if n <= FINE_LAYERS => Self::Fine,
+            n if n <= COARSE_LAYERS => Self::Coarse,
+            _ => Self::Plain,
+        }
+    }
+
+    fn samples(self) -> usize {
+        if self == Self::Fine { SAMPLES } else { 1 }
+    }
+}
+
+/// Where the samples of a tile lie.
+#[derive(Clone, Copy)]
+struct Lattice {
+    /// The tile's upper left corner, pixels.
+    origin: Vec2,
+    /// Samples per pixel and axis.
+    n: usize,
+}
+
+impl Lattice {
+    /// Samples per tile and axis.
+    fn row(self) -> usize {
+        TILE * self.n
+    }
+
+    /// A sample this far outside an outline is still partly covered: half a sample.
+    fn fringe_px(self) -> f32 {
+        0.5 / self.n as f32
+    }
+
+    /// The indices of the samples from `low` to `high` along an axis on which the tile begins at `from`.
+    fn clip(self, low: f32, high: f32, from: f32) -> Range<usize> {
+        let index = |at: f32| (at - from) * self.n as f32 - 0.5;
+        // Casts saturate at 0; one sample of slack on either side covers rounding.
+        let first = (index(low) - 1.0) as usize;
+        let last = (index(high) + 2.0).max(0.0) as usize;
+        first..last.min(self.row())
+    }
+
+    /// A sample's place along an axis.
+    fn place(self, from: f32, index: usize) -> f32 {
+        from + (index as f32 + 0.5) * (1.0 / self.n as f32)
+    }
+}
+
 /// The samples of one tile.
 pub(crate) struct Samples {
+    lattice: Lattice,
     best: Vec<Best>,
     blend: Vec<Blend>,
 }
@@ -82,43 +149,56 @@ impl Samples {
     /// Samples that see nothing.
     pub(crate) fn new() -> Self {
         let n = TILE_SAMPLES * TILE_SAMPLES;
-        Self { best: vec![Best::nothing(); n], blend: vec![Blend::NOTHING; n] }
+        let lattice = Lattice { origin: Vec2::ZERO, n: SAMPLES };
+        Self { lattice, best: vec![Best::nothing(); n], blend: vec![Blend::NOTHING; n] }
     }
 
     /// Draws the listed cones of the tile whose upper left corner is `origin`.
-    pub(crate) fn draw(&mut self, job: &Job<'_>, list: &[u32], origin: Vec2) {
-        self.best.fill(Best::nothing());
-        self.blend.fill(Blend::NOTHING);
-        let margin = if job.has_depth { GAP_PX } else { FRINGE_PX };
+    pub(crate) fn draw(&mut self, job: &Job<'_>, list: &[u32], origin: Vec2, detail: Detail) {
+        self.lattice = Lattice { origin, n: detail.samples() };
+        let (lattice, n_samples) = (self.lattice, self.lattice.row() * self.lattice.row());
+        self.best[..n_samples].fill(Best::nothing());
+        self.blend[..n_samples].fill(Blend::NOTHING);
+        let is_plain = detail == Detail::Plain;
+        let margin = if job.has_depth && !is_plain { GAP_PX } else { lattice.fringe_px() };
         for &index in list {
             let edge = &job.drawn[index as usize];
             let all = |_: usize| true;
-            for_each_sample(&edge.cone, (origin, margin), all, |sample, hit| {
-                self.best[sample].offer(index, hit);
+            for_each_sample(&edge.cone, (lattice, margin), all, |sample, hit| {
+                self.best[sample].offer(index, hit, lattice.fringe_px());
             });
         }
         // Most samples see one cone only and have nothing to blend.
-        for (best, blend) in self.best.iter().zip(&mut self.blend) {
-            if best.n_near == 1 && best.index != NOTHING {
+        for (best, blend) in self.best[..n_samples].iter().zip(&mut self.blend) {
+            if (is_plain || best.n_near == 1) && best.index != NOTHING {
                 blend.add(job, &job.drawn[best.index as usize], &best.hit, 1.0);
             }
         }
-        let best = &self.best;
+        if !is_plain {
+            self.blend_neighbours(job, list, margin);
+        }
+    }
+
+    /// Blends where several cones reach a sample.
+    fn blend_neighbours(&mut self, job: &Job<'_>, list: &[u32], margin: f32) {
+        let (lattice, best) = (self.lattice, &self.best);
         for &index in list {
             let edge = &job.drawn[index as usize];
             let shared = |sample: usize| best[sample].n_near > 1 && best[sample].index != NOTHING;
-            for_each_sample(&edge.cone, (origin, margin), shared, |sample, hit| {
-                weigh(job, &mut self.blend[sample], &best[sample], (index, edge, hit));
+            for_each_sample(&edge.cone, (lattice, margin), shared, |sample, hit| {
+                let cone = Reaching { index, edge, hit, fringe_px: lattice.fringe_px() };
+                weigh(job, &mut self.blend[sample], &best[sample], &cone);
             });
         }
     }
 
     /// The pixel at (column, row) of the tile.
     pub(crate) fn resolve(&self, job: &Job<'_>, column: usize, row: usize) -> Pixel {
-        let first = row * SAMPLES * TILE_SAMPLES + column * SAMPLES;
-        let at = |i: usize| first + (i / SAMPLES) * TILE_SAMPLES + i % SAMPLES;
+        let Lattice { n, .. } = self.lattice;
+        let first = (row * self.lattice.row() + column) * n;
+        let at = |i: usize| first + (i / n) * self.lattice.row() + i % n;
         let (mut color, mut covered) = ([0.0; 3], 0.0);
-        for sample in (0..SAMPLES * SAMPLES).map(at) {
+        for sample in (0..n * n).map(at) {
             let coverage = self.coverage(sample);
             if coverage > 0.0 {
                 let shaded = self.shaded(job, sample);
@@ -130,15 +210,15 @@ impl Samples {
             return Pixel::EMPTY;
         }
         // The centre speaks for the pixel; at the rim, where it is empty, the first sample that is not.
-        let center = SAMPLES * SAMPLES / 2;
+        let center = n * n / 2;
         let speaker = std::iter::once(center)
-            .chain(0..SAMPLES * SAMPLES)
+            .chain(0..n * n)
             .map(at)
             .find(|&sample| self.coverage(sample) > 0.0)
             .unwrap_or(first);
         let best = &self.best[speaker];
         Pixel {
-            coverage: covered / (SAMPLES * SAMPLES) as f32,
+            coverage: covered / (n * n) as f32,
             node: job.drawn[best.index as usize].node,
             share: best.hit.share,
             height_px: best.hit.height,
@@ -149,7 +229,10 @@ impl Samples {
 
     fn coverage(&self, sample: usize) -> f32 {
         let best = &self.best[sample];
-        if best.index == NOTHING { 0.0 } else { (0.5 - best.outside * SAMPLES as f32).clamp(0.0, 1.0) }
+        if best.index == NOTHING {
+            return 0.0;
+        }
+        (0.5 - best.outside * self.lattice.n as f32).clamp(0.0, 1.0)
     }
 
     fn shaded(&self, job: &Job<'_>, sample: usize) -> Rgb {
@@ -163,8 +246,17 @@ impl Samples {
     }
 }
 
+/// A cone at a sample that it reaches.
+struct Reaching<'a> {
+    index: u32,
+    edge: &'a Drawn,
+    hit: Hit,
+    fringe_px: f32,
+}
+
 /// Adds a cone's say to the blending of a sample that several cones reach.
-fn weigh(job: &Job<'_>, blend: &mut Blend, best: &Best, (index, edge, hit): (u32, &Drawn, Hit)) {
+fn weigh(job: &Job<'_>, blend: &mut Blend, best: &Best, cone: &Reaching<'_>) {
+    let Reaching { index, edge, hit, fringe_px } = *cone;
     let winner = &job.drawn[best.index as usize];
     let arc = |edge: &Drawn, hit: &Hit| edge.arc_px[0] + hit.share * (edge.arc_px[1] - edge.arc_px[0]);
     let radii = hit.radius + best.hit.radius;
@@ -176,7 +268,7 @@ fn weigh(job: &Job<'_>, blend: &mut Blend, best: &Best, (index, edge, hit): (u32
                 reach * radii,
             )
     };
-    if hit.outside > FRINGE_PX {
+    if hit.outside > fringe_px {
         // Beside the outline: a gap if this cone passes in front of a distant part.
         let passes_in_front = hit.z > best.hit.z + 0.5 * radii && !is_near(2.0 * BLEND_REACH);
         if passes_in_front {
@@ -201,28 +293,21 @@ fn weigh(job: &Job<'_>, blend: &mut Blend, best: &Best, (index, edge, hit): (u32
 /// Calls `visit` with each sample of the tile at `origin` that a cone reaches and that is `wanted`.
 fn for_each_sample(
     cone: &Cone,
-    (origin, margin): (Vec2, f32),
+    (lattice, margin): (Lattice, f32),
     wanted: impl Fn(usize) -> bool,
     mut visit: impl FnMut(usize, Hit),
 ) {
-    const STEP: f32 = 1.0 / SAMPLES as f32;
-    let clip = |low: f32, high: f32, from: f32| {
-        let index = |at: f32| (at - from) * SAMPLES as f32 - 0.5;
-        // Casts saturate at 0; one sample of slack on either side covers rounding.
-        let first = (index(low) - 1.0) as usize;
-        let last = (index(high) + 2.0).max(0.0) as usize;
-        first..last.min(TILE_SAMPLES)
-    };
     let (low, high) = cone.bounds();
-    for row in clip(low.y - margin, high.y + margin, origin.y) {
-        let y = origin.y + (row as f32 + 0.5) * STEP;
+    let origin = lattice.origin;
+    for row in lattice.clip(low.y - margin, high.y + margin, origin.y) {
+        let y = lattice.place(origin.y, row);
         let Some((from, to)) = cone.span(y, margin) else { continue };
-        for column in clip(from, to, origin.x) {
-            let sample = row * TILE_SAMPLES + column;
+        for column in lattice.clip(from, to, origin.x) {
+            let sample = row * lattice.row() + column;
             if !wanted(sample) {
                 continue;
             }
-            let pixel = Vec2::new(origin.x + (column as f32 + 0.5) * STEP, y);
+            let pixel = Vec2::new(lattice.place(origin.x, column), y);
             if let Some(hit) = cone.at(pixel, margin) {
                 visit(sample, hit);
             }

@@ -9,6 +9,7 @@
 //! section shows lines.
 //! **Source** figures of section 5 of [Hu2022]. **Cost** that of as many small pictures.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use espalier_model::{Branches, MethodRow, Tree, View};
@@ -509,15 +510,21 @@ fn notes(section: &Section<'_>, row: &MethodRow) -> Vec<(String, bool)> {
 }
 
 /// Those of the points, the first first, that are not nearer than `least_px` to one taken before: rings upon rings
-/// would hide the tree.
+/// would hide the tree. Cells as wide as that hold at most four taken points.
 fn apart(points: impl Iterator<Item = DVec2>, least_px: f64) -> Vec<DVec2> {
-    let mut taken: Vec<DVec2> = Vec::new();
+    let mut taken: BTreeMap<[i64; 2], Vec<DVec2>> = BTreeMap::new();
+    let mut list = Vec::new();
     for point in points {
-        if taken.iter().all(|other| other.distance_squared(point) >= least_px * least_px) {
-            taken.push(point);
+        let cell = (point / least_px).floor().clamp(DVec2::splat(-1e9), DVec2::splat(1e9));
+        let [column, row] = [cell.x as i64, cell.y as i64];
+        let around = [-1, 0, 1].map(|step| taken.range([column + step, row - 1]..=[column + step, row + 1]));
+        let near = around.into_iter().flatten().flat_map(|(_, points)| points);
+        if near.into_iter().all(|other| other.distance_squared(point) >= least_px * least_px) {
+            taken.entry([column, row]).or_default().push(point);
+            list.push(point);
         }
     }
-    taken
+    list
 }
 
 /// Where two edges cross; the middle between their midpoints where they are parallel.

@@ -12,7 +12,9 @@
 //! **Differs from the source** subtrees that do not branch again have their chain's plane and no view beside it;
 //! levels end at `max_levels`.
 //! **Cost** a search costs some 500 × the edges of its part, and the parts of one level are disjoint, so
-//! O(N · min(depth, `max_levels`)); in parallel over parts.
+//! O(N · min(depth, `max_levels`)); in parallel over parts. Where that is much, as in trees of more than about
+//! 10,000 nodes, searches gather edges by direction: a binary tree of depth 16 then takes 1.5 s of processor time
+//! instead of 6.9 s, and of its 511 views the worst loses 0.0006 more than before (0.05 on average, 0.00003 more).
 
 use espalier_model::{Branches, LocalPlane, SubtreeView, Tree, View, ViewHierarchy};
 use glam::DVec3;
@@ -25,10 +27,28 @@ use crate::objective::Objective;
 use crate::params::Params;
 use crate::search::best_direction;
 
+/// Edges of all levels together up to which searches see every edge: some two seconds of work.
+const MANY_EDGES: usize = 200_000;
+/// Parts of fewer edges are never gathered; those of more than the second always.
+const GATHERED: [usize; 2] = [512, 32_768];
+/// Edges per cell: the search among cells then costs about three times what all edges cost to judge its answer.
+const EDGES_PER_CELL: usize = 16;
+/// Cells per side of a cube's face: 11° and 3° wide.
+const CELLS: [usize; 2] = [8, 32];
+
 /// A best view and what it took to find it.
 struct Sought<T> {
     found: T,
     n_evaluations: u64,
+}
+
+/// What all searches of a tree have in common.
+#[derive(Clone, Copy)]
+struct Task<'a> {
+    params: &'a Params,
+    seed: u64,
+    /// About how many edges the parts of all levels have together.
+    n_edges: usize,
 }
 
 /// All views of a tree, mirrors not chosen yet, and the number of evaluations of the view metric.
@@ -39,16 +59,21 @@ pub(crate) fn views_of_parts(
     seed: u64,
 ) -> (ViewHierarchy, u64) {
     let m = params.max_siblings;
-    let whole = global_view(tree, params, seed);
+    let roots = subtree_roots(tree, branches, params.max_levels);
+    let part = Part::subtree(tree, 0, m);
+    let n_below: usize = roots.iter().map(|&(_, root)| tree.subtree(root).len()).sum();
+    let edges_per_node = (part.real.len() + part.imaginary.len()).div_ceil(tree.n_nodes());
+    let task = Task { params, seed, n_edges: edges_per_node * (tree.n_nodes() + n_below) };
+    let whole = global_view(tree, &part, task);
     let global = whole.found;
     let reference = Frame::of(&global);
-    let view = |part: Part| best_view(tree, &part, reference, params, seed);
+    let view = |part: Part| best_view(tree, &part, reference, task);
     let plane = |part: Part| {
         let Sought { found, n_evaluations } = view(part);
         Sought { found: LocalPlane { view: found, is_mirrored: false }, n_evaluations }
     };
 
-    let subtrees: Vec<Sought<SubtreeView>> = subtree_roots(tree, branches, params.max_levels)
+    let subtrees: Vec<Sought<SubtreeView>> = roots
         .into_par_iter()
         .map(|(level, root)| {
             let Sought { found, n_evaluations } = view(Part::subtree(tree, root, m));
@@ -77,26 +102,40 @@ pub(crate) fn views_of_parts(
 }
 
 /// The best view of the whole tree, or the view that the user wants.
-fn global_view(tree: &Tree, params: &Params, seed: u64) -> Sought<View> {
-    let part = Part::subtree(tree, 0, params.max_siblings);
+fn global_view(tree: &Tree, part: &Part, task: Task<'_>) -> Sought<View> {
+    let params = task.params;
     let Some(fixed) = params.fixed_view.map(DVec3::from_array) else {
-        return best_view(tree, &part, Frame::ANTERIOR, params, seed);
+        return best_view(tree, part, Frame::ANTERIOR, task);
     };
     // Scaled first, for the square of a large coordinate overflows.
     let towards_camera = (fixed / fixed.abs().max_element()).normalize();
-    let loss = Edges::of(tree, &part).seen_from(towards_camera, params.metric).loss;
+    let loss = Edges::of(tree, part).seen_from(towards_camera, params.metric).loss;
     let frame = Frame::ANTERIOR.seen_from(towards_camera);
-    Sought { found: view_of(tree, &part, frame, loss), n_evaluations: 1 }
+    Sought { found: view_of(tree, part, frame, loss), n_evaluations: 1 }
 }
 
 /// The best view of a part, on the side that faces the reference.
-fn best_view(tree: &Tree, part: &Part, reference: Frame, params: &Params, seed: u64) -> Sought<View> {
+fn best_view(
+    tree: &Tree,
+    part: &Part,
+    reference: Frame,
+    Task { params, seed, n_edges }: Task<'_>,
+) -> Sought<View> {
     let edges = Edges::of(tree, part);
-    let objective = Objective { edges: &edges, metric: params.metric, reference };
+    let objective =
+        Objective { edges: &edges, cells: cells(edges.len(), n_edges), metric: params.metric, reference };
     let best = best_direction(&objective, params, seed);
     let loss = edges.seen_from(best.direction, params.metric).loss;
     let frame = reference.seen_from(reference.facing(best.direction));
     Sought { found: view_of(tree, part, frame, loss), n_evaluations: best.n_evaluations }
+}
+
+/// Cells per side by which a part's edges are gathered for its search; `None` where it sees them all.
+fn cells(n_edges: usize, n_edges_of_all: usize) -> Option<usize> {
+    let [some, many] = GATHERED;
+    let is_gathered = n_edges > many || (n_edges_of_all > MANY_EDGES && n_edges > some);
+    let cells_per_side = || (n_edges / (3 * EDGES_PER_CELL)).isqrt().clamp(CELLS[0], CELLS[1]);
+    is_gathered.then(cells_per_side)
 }
 
 fn view_of(tree: &Tree, part: &Part, frame: Frame, loss: f64) -> View {

@@ -68,6 +68,21 @@ impl Edges {
         longest.map(|&(direction, _)| direction)
     }
 
+    /// About the same loss from any direction, with at most 3 n² edges: those of nearly one direction become one.
+    ///
+    /// Cells are n × n on each face of a cube, one face for both ends of an axis; an edge stands for its cell with
+    /// the sum of the shares and their mean direction.
+    pub(crate) fn gathered(&self, n: usize) -> Self {
+        let mut cells = vec![(DVec3::ZERO, 0.0); 3 * n * n];
+        for &(direction, share) in &self.list {
+            let (cell, direction) = cell_of(direction, n);
+            cells[cell].0 += share * direction;
+            cells[cell].1 += share;
+        }
+        let full = cells.into_iter().filter(|&(_, share)| share > 0.0);
+        Self { list: full.map(|(sum, share)| (sum.normalize_or_zero(), share)).collect() }
+    }
+
     /// What the view from `towards_camera`, a unit vector, shows and loses.
     pub(crate) fn seen_from(&self, towards_camera: DVec3, metric: Metric) -> Seen {
         let (mut shown, mut entropy) = (0.0, 0.0);
@@ -88,6 +103,26 @@ impl Edges {
         // Rounding can leave a zero loss a few 1e-17 below zero.
         Seen { loss: loss.clamp(0.0, NOTHING_SHOWN), shown }
     }
+}
+
+/// The cell of a direction, and of the direction and its opposite the one on the cell's side: they look alike.
+fn cell_of(direction: DVec3, n: usize) -> (usize, DVec3) {
+    let size = direction.abs();
+    let face = if size.x >= size.y && size.x >= size.z {
+        0
+    } else if size.y >= size.z {
+        1
+    } else {
+        2
+    };
+    let direction = if direction[face] < 0.0 { -direction } else { direction };
+    // From −1 to 1 across the face; the cast truncates what is not negative.
+    let place = |axis: usize| {
+        let at = 0.5 * (direction[axis] / direction[face] + 1.0) * n as f64;
+        (at as usize).min(n - 1)
+    };
+    let (column, row) = (place((face + 1) % 3), place((face + 2) % 3));
+    ((face * n + row) * n + column, direction)
 }
 
 /// The direction and the length of a vector; `None` if it has no length.
@@ -138,6 +173,23 @@ mod tests {
         assert!(chain.seen_from(slanted, Metric::Ukl).loss > 0.04);
         assert_eq!(chain.seen_from(DVec3::X, Metric::Kl).loss, NOTHING_SHOWN);
         assert_eq!(chain.seen_from(DVec3::X, Metric::Ukl).loss, 1.0);
+    }
+
+    #[test]
+    fn gathered_edges_lose_about_the_same() {
+        let all =
+            edges(&espalier_geom::space::half_sphere(5000).map(|v| v * (1.5 + v.x)).collect::<Vec<_>>());
+        for (n, tolerance) in [(8, 5e-3), (32, 4e-4)] {
+            let few = all.gathered(n);
+            assert!(few.len() <= 3 * n * n);
+            assert!((few.list.iter().map(|edge| edge.1).sum::<f64>() - 1.0).abs() < 1e-12);
+            for view in espalier_geom::space::half_sphere(40) {
+                let off = few.seen_from(view, Metric::Ukl).loss - all.seen_from(view, Metric::Ukl).loss;
+                assert!(off.abs() < tolerance, "{n} {off}");
+            }
+        }
+        let opposite = edges(&[DVec3::X, DVec3::NEG_X, DVec3::new(1.0, 1.0, 1.0), DVec3::NEG_ONE]);
+        assert_eq!(opposite.gathered(4).len(), 2);
     }
 
     #[test]

@@ -37,6 +37,8 @@ const VISITS_PER_TASK: usize = 20_000;
 pub(crate) struct Objective<'a> {
     /// The edges to look at.
     pub(crate) edges: &'a Edges,
+    /// Cells per side of a cube's face by which a search may gather edges; `None` where it can afford them all.
+    pub(crate) cells: Option<usize>,
     /// How loss is measured.
     pub(crate) metric: Metric,
     /// Decides among equally good directions.

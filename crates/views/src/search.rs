@@ -6,20 +6,26 @@
 //! over the half sphere. 2. Take the best, the next best at least one spiral spacing away from it, and so on,
 //! `refine_starts` in all. 3. From each: try ±h along two axes of the tangent plane, the way of the last move first;
 //! go to the first that is better, or else halve h; until h < `refine_step_rad`.
-//! **Guarantees** never worse than any seed or spiral direction; deterministic; ties go to the lower index.
+//! Where the objective asks for cells, the seeds see all edges, the rest of the search those gathered by direction;
+//! then a paraboloid through six directions around the answer, seen by all edges, gives the last step.
+//! **Guarantees** never worse than any seed, and without cells than any spiral direction; deterministic; ties go to the
+//! lower index.
 //! **Source** the argmin of [Hu2022] section 3.1.2; the spiral and the pattern search are textbook methods.
-//! **Cost** 3 evaluations for a straight or planar part, else n + about 200 · `refine_starts`.
+//! **Cost** 3 evaluations for a straight or planar part, else n + about 200 · `refine_starts`; with cells 11 of them by
+//! all edges.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 use espalier_geom::{math, space};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use crate::objective::{LOSSLESS, Objective};
 use crate::params::{Params, Search};
 use crate::swarm;
 
+/// The places of the stencil, in steps to the right and up.
+const STENCIL: [[f64; 2]; 6] = [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0], [1.0, 1.0]];
 /// Moves of one pattern search: a bound for valleys that wind around the sphere, far above the usual 20.
 const MAX_MOVES: u32 = 500;
 
@@ -36,10 +42,50 @@ pub(crate) struct Best {
 
 /// The best direction, by the search that the parameters name.
 pub(crate) fn best_direction(objective: &Objective, params: &Params, seed: u64) -> Best {
-    match params.search {
-        Search::Fibonacci => fibonacci(objective, params),
-        Search::Pso => swarm::fly(objective, params, seed),
+    match (params.search, objective.cells) {
+        (Search::Fibonacci, None) => fibonacci(objective, params),
+        (Search::Fibonacci, Some(n)) => gathered(objective, params, n),
+        (Search::Pso, _) => swarm::fly(objective, params, seed),
     }
+}
+
+/// The search among gathered edges; its answer, one step from there and the seeds are then judged by all edges.
+fn gathered(objective: &Objective, params: &Params, n_cells: usize) -> Best {
+    let seeds = objective.seeds();
+    let candidates = evaluated(objective, &seeds);
+    if let Some(&best) = candidates.first().filter(|best| best.value <= LOSSLESS) {
+        return Best { n_evaluations: candidates.len() as u64, ..best };
+    }
+    let few = objective.edges.gathered(n_cells);
+    let rough = fibonacci(&Objective { edges: &few, cells: None, ..*objective }, params);
+    let around = stencil(rough.direction, objective.reference.up, FRAC_PI_4 / n_cells as f64);
+    let values = objective.at_each(&around);
+    let exact: Vec<DVec3> = std::iter::once(around[0]).chain(lowest_point(&around, &values)).collect();
+    let candidates = candidates.into_iter().chain(evaluated(objective, &exact));
+    let best = candidates.reduce(|a, b| if b.value < a.value { b } else { a }).unwrap_or(rough);
+    Best { n_evaluations: rough.n_evaluations + (seeds.len() + around.len() + exact.len()) as u64, ..best }
+}
+
+/// A direction, one to its right, left, top and bottom, and one between right and top, at `step_rad`.
+fn stencil(center: DVec3, up_hint: DVec3, step_rad: f64) -> [DVec3; 6] {
+    let (right, up) = space::plane_axes(center, up_hint);
+    STENCIL.map(|[x, y]| (center + step_rad * (x * right + y * up)).normalize())
+}
+
+/// Where the paraboloid through the six values is lowest, no farther than the stencil; `None` if it has no bottom.
+fn lowest_point(around: &[DVec3; 6], values: &[f64]) -> Option<DVec3> {
+    let &[center, right, left, up, down, diagonal] = values else { return None };
+    // In steps of the stencil: f = center + g · x + ½ xᵀ H x.
+    let gradient = DVec2::new(0.5 * (right - left), 0.5 * (up - down));
+    let (xx, yy) = (right + left - 2.0 * center, up + down - 2.0 * center);
+    let xy = diagonal - center - gradient.x - gradient.y - 0.5 * (xx + yy);
+    let determinant = xx * yy - xy * xy;
+    if !(xx > 0.0 && determinant > 0.0) {
+        return None;
+    }
+    let x = -DVec2::new(yy * gradient.x - xy * gradient.y, xx * gradient.y - xy * gradient.x) / determinant;
+    let x = x.clamp_length_max(1.0);
+    Some((around[0] + x.x * (around[1] - around[0]) + x.y * (around[3] - around[0])).normalize())
 }
 
 fn fibonacci(objective: &Objective, params: &Params) -> Best {
