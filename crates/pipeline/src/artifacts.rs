@@ -9,7 +9,7 @@ use std::sync::Arc;
 use espalier_model::swc::{self, Traced};
 use espalier_model::{
     Comparison, Diagnose, Edits, Embedding, InscribedSpheres, Ledger, Mask, Report, Skeleton, Tree,
-    ViewHierarchy, Volume,
+    ViewHierarchy,
 };
 
 use crate::config::{Input, Unit};
@@ -37,7 +37,6 @@ pub(crate) struct Artifacts {
     pub(crate) input: Input,
     /// Whether neither the user nor the traced tree's file has said what its unit is.
     pub(crate) is_unit_guessed: bool,
-    pub(crate) volume: Option<Arc<Volume>>,
     pub(crate) traced: Option<Arc<Traced>>,
     pub(crate) mask: Option<Arc<Mask>>,
     /// What the mask has lost on the way from the scan.
@@ -60,16 +59,18 @@ pub(crate) struct Lookup<'a> {
 }
 
 impl Artifacts {
-    /// The scan, with what its reader had to say.
-    pub(crate) fn volume(&mut self, lookup: Lookup<'_>) -> Result<(Arc<Volume>, Report), Error> {
-        if let Some(volume) = &self.volume {
-            return Ok((Arc::clone(volume), Report::default()));
-        }
+    /// The mask that the stage `volume` makes of the scan, with what its reader had to say.
+    pub(crate) fn segmented(
+        &self,
+        lookup: Lookup<'_>,
+        params: &espalier_volume::Params,
+    ) -> Result<espalier_volume::Segmented, Error> {
         let path = self.locate(Artifact::Volume, lookup)?;
-        let loaded = self.read_volume(&path, lookup.stage)?;
-        let volume = Arc::new(loaded.volume);
-        self.volume = Some(Arc::clone(&volume));
-        Ok((volume, loaded.report))
+        espalier_volume::read_mask(&path, &self.read_options, params).map_err(|error| match error {
+            // The reader's own message names the file; the others know the volume, not where it came from.
+            espalier_volume::Error::Read { .. } => Error::stage(lookup.stage)(Box::new(error)),
+            error => Error::file(&path, error),
+        })
     }
 
     /// The traced tree, with what its reader had to say.

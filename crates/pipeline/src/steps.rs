@@ -80,14 +80,8 @@ fn phantom(step: &mut Step<'_>) -> Result<Outcome, Error> {
 }
 
 fn volume(step: &mut Step<'_>) -> Result<Outcome, Error> {
-    let (scan, mut report) = step.take(Artifacts::volume)?;
-    let segmented = espalier_volume::segment(&scan, &step.config.volume).map_err(|error| {
-        // The stage knows the volume, not where it came from.
-        match step.artifacts.files.get(&Artifact::Volume) {
-            Some(path) => Error::file(path, error),
-            None => step.failed(error),
-        }
-    })?;
+    let params = step.config.volume.clone();
+    let segmented = step.take(|artifacts, lookup| artifacts.segmented(lookup, &params))?;
     let mask = on_stored_grid(segmented.mask).map_err(|error| step.failed(error))?;
     let n_foreground = mask.n_foreground();
     let mut line = format!(
@@ -101,13 +95,11 @@ fn volume(step: &mut Step<'_>) -> Result<Outcome, Error> {
     if n_dropped > 0.0 {
         line = format!("{line}; {n_dropped} components dropped");
     }
-    report.extend(segmented.report);
+    let report = segmented.report;
     let files = vec![
         step.place(Artifact::Mask, nifti_out::mask(&mask).map_err(|error| step.failed(error))?),
         step.beside("dropped.tsv", dropped.into_bytes()),
     ];
-    // The scan is not needed any more, and it is the largest thing of the run.
-    step.artifacts.volume = None;
     step.artifacts.mask = Some(Arc::new(mask));
     Ok(Outcome { files, report, line })
 }

@@ -50,7 +50,8 @@ fn pack<T: Copy + PartialEq + Sync>(array: &Array3<T>, test: impl Fn(T) -> bool 
     bits
 }
 
-fn pack_word<T: Copy + PartialEq>(values: &[T], test: impl Fn(T) -> bool) -> u64 {
+/// A bit for each of up to 64 values, the first lowest.
+pub(crate) fn pack_word<T: Copy + PartialEq>(values: &[T], mut test: impl FnMut(T) -> bool) -> u64 {
     if let Ok(values) = <&[T; 64]>::try_from(values)
         && *values == [values[0]; 64]
     {

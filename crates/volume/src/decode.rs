@@ -15,6 +15,21 @@ use crate::ReadError;
 use crate::scalar::Scalar;
 use crate::stored::Stored;
 
+/// What makes a number of a type out of the bytes of a stored one; not a choice of two functions, which would be called
+/// for each number.
+macro_rules! number {
+    ($stored:expr, $file_type:ty) => {{
+        let is_big_endian = $stored.is_big_endian;
+        move |mut bytes: [u8; size_of::<$file_type>()]| {
+            if is_big_endian {
+                bytes.reverse();
+            }
+            <$file_type>::from_le_bytes(bytes)
+        }
+    }};
+}
+pub(crate) use number;
+
 /// Numbers that are read at a time.
 const N_AT_A_TIME: usize = 8192;
 /// Whole numbers are exact in a double up to here.
@@ -22,38 +37,40 @@ const MAX_EXACT: u64 = 1 << 53;
 
 /// Reads all voxels.
 pub(crate) fn read_voxels(stored: &mut Stored, report: &mut Report) -> Result<Voxels, ReadError> {
+    let n_inexact = Cell::new(0_usize);
     macro_rules! read_as {
-        ($file_type:ty, $convert:expr) => {{
-            let decode =
-                if stored.is_big_endian { <$file_type>::from_be_bytes } else { <$file_type>::from_le_bytes };
+        ($kind:ident, $file_type:ty, $convert:expr) => {{
             let convert = $convert;
-            read_array(stored, |bytes| convert(decode(bytes)))
+            let from_bytes = number!(stored, $file_type);
+            Voxels::$kind(read_array(stored, |bytes| convert(from_bytes(bytes)))?)
         }};
     }
-    let n_inexact = Cell::new(0_usize);
     let voxels = match stored.scalar {
-        Scalar::U8 => Voxels::U8(read_as!(u8, |v| v)?),
-        Scalar::I8 => Voxels::I16(read_as!(i8, i16::from)?),
-        Scalar::I16 => Voxels::I16(read_as!(i16, |v| v)?),
-        Scalar::U16 => Voxels::U16(read_as!(u16, |v| v)?),
-        Scalar::I32 => Voxels::I32(read_as!(i32, |v| v)?),
-        Scalar::U32 => Voxels::U32(read_as!(u32, |v| v)?),
-        Scalar::F32 => Voxels::F32(read_as!(f32, |v| v)?),
-        Scalar::F64 => Voxels::F64(read_as!(f64, |v| v)?),
-        Scalar::I64 => Voxels::F64(read_as!(i64, |v: i64| {
-            n_inexact.update(|n| n + usize::from(v.unsigned_abs() > MAX_EXACT));
-            v as f64
-        })?),
-        Scalar::U64 => Voxels::F64(read_as!(u64, |v: u64| {
-            n_inexact.update(|n| n + usize::from(v > MAX_EXACT));
-            v as f64
-        })?),
+        Scalar::U8 => read_as!(U8, u8, |v| v),
+        Scalar::I8 => read_as!(I16, i8, i16::from),
+        Scalar::I16 => read_as!(I16, i16, |v| v),
+        Scalar::U16 => read_as!(U16, u16, |v| v),
+        Scalar::I32 => read_as!(I32, i32, |v| v),
+        Scalar::U32 => read_as!(U32, u32, |v| v),
+        Scalar::F32 => read_as!(F32, f32, |v| v),
+        Scalar::F64 => read_as!(F64, f64, |v| v),
+        Scalar::I64 => read_as!(F64, i64, |v: i64| whole(v.unsigned_abs(), v as f64, &n_inexact)),
+        Scalar::U64 => read_as!(F64, u64, |v: u64| whole(v, v as f64, &n_inexact)),
     };
-    let n_inexact = n_inexact.get();
+    warn_of_inexact(n_inexact.get(), report);
+    Ok(voxels)
+}
+
+/// A whole number as a double; counts those that a double cannot hold.
+pub(crate) fn whole(magnitude: u64, value: f64, n_inexact: &Cell<usize>) -> f64 {
+    n_inexact.update(|n| n + usize::from(magnitude > MAX_EXACT));
+    value
+}
+
+pub(crate) fn warn_of_inexact(n_inexact: usize, report: &mut Report) {
     if n_inexact > 0 {
         report.warn("W-VOLUME-INEXACT", format!("{n_inexact} numbers beyond 2^53 were rounded"));
     }
-    Ok(voxels)
 }
 
 /// Reads as many numbers of `N` bytes as the volume has voxels.

@@ -52,32 +52,64 @@ pub enum Kind {
 /// ```
 #[must_use]
 pub fn inspect_kind(volume: &Volume) -> Kind {
-    let mut distinct: Vec<f64> = Vec::new();
-    let (mut min, mut max) = (f64::INFINITY, f64::NEG_INFINITY);
-    let mut last = f64::NAN;
-    volume.for_each_value(|value| {
+    let mut census = Census::default();
+    volume.for_each_value(|value| census.see(value));
+    census.kind()
+}
+
+/// The values of a volume as far as its kind depends on them.
+#[derive(Clone, Debug)]
+pub(crate) struct Census {
+    /// The distinct finite values, ascending, as long as they are few.
+    distinct: Vec<f64>,
+    /// The smallest finite value.
+    pub(crate) min: f64,
+    /// The largest finite value.
+    pub(crate) max: f64,
+    /// Whether there are values that are not finite.
+    pub(crate) has_other: bool,
+    last: f64,
+}
+
+impl Default for Census {
+    fn default() -> Self {
+        let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
+        Self { distinct: Vec::new(), min, max, has_other: false, last: f64::NAN }
+    }
+}
+
+impl Census {
+    /// Takes notice of a value.
+    pub(crate) fn see(&mut self, value: f64) {
         // Most voxels are as their neighbour before.
-        if value == last || !value.is_finite() {
+        if value == self.last {
             return;
         }
-        last = value;
-        (min, max) = (min.min(value), max.max(value));
-        if distinct.len() <= MAX_LABELS
-            && let Err(place) = distinct.binary_search_by(|known| known.total_cmp(&(value + 0.0)))
+        if !value.is_finite() {
+            self.has_other = true;
+            return;
+        }
+        self.last = value;
+        (self.min, self.max) = (self.min.min(value), self.max.max(value));
+        if self.distinct.len() <= MAX_LABELS
+            && let Err(place) = self.distinct.binary_search_by(|known| known.total_cmp(&(value + 0.0)))
         {
-            distinct.insert(place, value + 0.0);
+            self.distinct.insert(place, value + 0.0);
         }
-    });
+    }
 
-    let is_label = |&value: &f64| value.trunc() == value && (0.0..=MAX_LABEL).contains(&value);
-    match distinct[..] {
-        [] => Kind::Constant { value: f64::NAN },
-        [value] => Kind::Constant { value },
-        [low, high] if high == 0.0 => Kind::Mask { background: high, foreground: low },
-        [low, high] => Kind::Mask { background: low, foreground: high },
-        _ if distinct.len() <= MAX_LABELS && distinct.iter().all(is_label) => {
-            Kind::Labels { values: distinct }
+    /// What a volume of these values is.
+    pub(crate) fn kind(&self) -> Kind {
+        let is_label = |&value: &f64| value.trunc() == value && (0.0..=MAX_LABEL).contains(&value);
+        match self.distinct[..] {
+            [] => Kind::Constant { value: f64::NAN },
+            [value] => Kind::Constant { value },
+            [low, high] if high == 0.0 => Kind::Mask { background: high, foreground: low },
+            [low, high] => Kind::Mask { background: low, foreground: high },
+            _ if self.distinct.len() <= MAX_LABELS && self.distinct.iter().all(is_label) => {
+                Kind::Labels { values: self.distinct.clone() }
+            }
+            _ => Kind::Ct { min: self.min, max: self.max },
         }
-        _ => Kind::Ct { min, max },
     }
 }

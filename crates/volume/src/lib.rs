@@ -17,6 +17,7 @@
 //! | cavities filled | `cavities` |
 //! | tunnels counted | `euler` |
 //! | **[`segment`]**: `Volume` → [`Mask`](espalier_model::Mask) | `segment` |
+//! | **[`read_mask`]**: file → `Mask`, without holding the volume where values alone decide | `read_mask`, `stream` |
 //!
 //! **Spaces** World is RAS+ mm. A voxel is (x, y, z) on the file's own axes, x fastest.
 //!
@@ -54,6 +55,9 @@ mod euler;
 mod flood;
 mod segment;
 
+mod read_mask;
+mod stream;
+
 mod error;
 mod params;
 mod read_error;
@@ -64,4 +68,5 @@ pub use kind::{Kind, inspect_kind};
 pub use params::{AssumedSpace, Components, Method, Params, ReadOptions};
 pub use read::{Loaded, read};
 pub use read_error::ReadError;
+pub use read_mask::read_mask;
 pub use segment::{Segmented, clean, segment};

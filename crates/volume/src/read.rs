@@ -59,7 +59,7 @@ fn read_any(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
     Ok(Loaded { volume, report })
 }
 
-fn check_limit(needed: u64, options: &ReadOptions) -> Result<(), ReadError> {
+pub(crate) fn check_limit(needed: u64, options: &ReadOptions) -> Result<(), ReadError> {
     if needed > options.max_bytes {
         return Err(ReadError::TooLarge { needed, limit: options.max_bytes });
     }
@@ -67,7 +67,7 @@ fn check_limit(needed: u64, options: &ReadOptions) -> Result<(), ReadError> {
 }
 
 /// The grid of a volume; none where its axes are sheared and may be made orthogonal.
-fn orthogonal_grid(stored: &Stored, options: &ReadOptions) -> Result<Option<Grid>, ReadError> {
+pub(crate) fn orthogonal_grid(stored: &Stored, options: &ReadOptions) -> Result<Option<Grid>, ReadError> {
     match Grid::new(stored.shape, stored.world_from_voxel).and_then(|grid| stored_grid(&grid)) {
         Ok(grid) => Ok(Some(grid)),
         Err(GridError::Sheared { .. }) if !options.strict => Ok(None),
@@ -75,7 +75,7 @@ fn orthogonal_grid(stored: &Stored, options: &ReadOptions) -> Result<Option<Grid
     }
 }
 
-fn count_grid(grid: &Grid, report: &mut Report) {
+pub(crate) fn count_grid(grid: &Grid, report: &mut Report) {
     let ([nx, ny, nz], spacing) = (grid.shape(), grid.spacing_mm());
     report.count_usize("shape_x", nx);
     report.count_usize("shape_y", ny);

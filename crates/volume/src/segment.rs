@@ -5,10 +5,11 @@
 //! components; 3. fill cavities.
 //! **Guarantees** the mask has at least one voxel, and the volume's grid; every step's effect is in the report.
 
-use espalier_model::{Ledger, Mask, Report, Volume};
+use espalier_model::{Grid, Ledger, Mask, Report, Volume};
 
+use crate::kind::Census;
 use crate::runs::Runs;
-use crate::select::select;
+use crate::select::{Selection, select};
 use crate::{Error, Params, cavities, components};
 
 /// A mask, and what was done to get it.
@@ -41,14 +42,26 @@ pub struct Segmented {
 /// and for a choice without any voxel.
 pub fn segment(volume: &Volume, params: &Params) -> Result<Segmented, Error> {
     params.validate()?;
-    let grid = volume.grid();
-    let mut report = Report::default();
-
-    // Choose the organ's voxels.
     let selection = select(volume, params)?;
+    segment_selection(selection, volume.grid(), params, || {
+        let mut census = Census::default();
+        volume.for_each_value(|value| census.see(value));
+        Ok((census.min, census.max))
+    })
+}
+
+/// What [`segment`] does once the voxels are chosen. `range` tells the smallest and the largest finite value, for a
+/// message.
+pub(crate) fn segment_selection(
+    selection: Selection,
+    grid: &Grid,
+    params: &Params,
+    range: impl FnOnce() -> Result<(f64, f64), Error>,
+) -> Result<Segmented, Error> {
+    let mut report = Report::default();
     let n_selected = selection.bits.count();
     if n_selected == 0 {
-        let (min, max) = range(volume);
+        let (min, max) = range()?;
         return Err(Error::Empty { what: selection.what, min, max });
     }
     if n_selected == grid.n_voxels() {
@@ -94,16 +107,4 @@ pub fn clean(mask: Mask, params: &Params) -> Result<Segmented, Error> {
     report.count_usize("foreground_voxels", n_foreground);
     report.count("foreground_ml", millilitres(n_foreground));
     Ok(Segmented { mask, ledger, report })
-}
-
-/// The smallest and the largest finite value; NaN if there is none.
-fn range(volume: &Volume) -> (f64, f64) {
-    let (mut min, mut max) = (f64::NAN, f64::NAN);
-    volume.for_each_value(|value| {
-        if value.is_finite() {
-            // The minimum of NaN and a number is the number.
-            (min, max) = (min.min(value), max.max(value));
-        }
-    });
-    (min, max)
 }

@@ -20,42 +20,61 @@ pub(crate) struct Selection {
 }
 
 pub(crate) fn select(volume: &Volume, params: &Params) -> Result<Selection, Error> {
-    let (lower, upper) = params.band();
-    match params.method {
-        Method::Auto => select_by_kind(volume, params.label),
-        Method::Mask => match inspect_kind(volume) {
-            Kind::Mask { background, .. } => Ok(select_mask(volume, background)),
-            _ => Ok(select_mask(volume, 0.0)),
-        },
-        Method::Threshold => Ok(Selection {
-            bits: choose(volume, |value| (lower..=upper).contains(&value)),
-            what: format!("the band {lower} to {upper}"),
-        }),
-        Method::RegionGrow => {
+    match wish(params) {
+        Wish::Kind => {
+            let background = background(inspect_kind(volume), params.method)?;
+            Ok(Selection { bits: choose(volume, is_in_mask(background)), what: MASK.to_owned() })
+        }
+        Wish::Values { is_wanted, what } => Ok(Selection { bits: choose(volume, is_wanted), what }),
+        Wish::Region => {
+            let (lower, upper) = params.band();
             let seed = region_grow::seed_voxel(volume.grid(), params)?;
             let bits = region_grow::grow(volume, seed, (lower, upper))?;
             Ok(Selection { bits, what: format!("the region in {lower} to {upper}") })
         }
-        // `Params::validate` refuses this method without a label.
-        Method::Label => Ok(select_label(volume, params.label.unwrap_or(f64::NAN))),
     }
 }
 
-fn select_label(volume: &Volume, label: f64) -> Selection {
-    Selection { bits: choose(volume, |value| value == label), what: format!("label {label}") }
+/// What decides whether a voxel is chosen.
+pub(crate) enum Wish {
+    /// The kind of the volume, and then the voxel's value.
+    Kind,
+    /// The voxel's value alone.
+    Values { is_wanted: Box<dyn Fn(f64) -> bool + Sync>, what: String },
+    /// Its place and the whole volume.
+    Region,
 }
 
-fn select_mask(volume: &Volume, background: f64) -> Selection {
-    let bits = choose(volume, |value| value != background && !value.is_nan());
-    Selection { bits, what: "the mask".to_owned() }
-}
-
-fn select_by_kind(volume: &Volume, label: Option<f64>) -> Result<Selection, Error> {
-    if let Some(label) = label {
-        return Ok(select_label(volume, label));
+pub(crate) fn wish(params: &Params) -> Wish {
+    let (lower, upper) = params.band();
+    match (params.method, params.label) {
+        (Method::Auto, None) | (Method::Mask, _) => Wish::Kind,
+        (Method::Threshold, _) => Wish::Values {
+            is_wanted: Box::new(move |value| (lower..=upper).contains(&value)),
+            what: format!("the band {lower} to {upper}"),
+        },
+        (Method::RegionGrow, _) => Wish::Region,
+        // `Params::validate` refuses the method `label` without one.
+        (Method::Auto | Method::Label, label) => {
+            let label = label.unwrap_or(f64::NAN);
+            Wish::Values { is_wanted: Box::new(move |value| value == label), what: format!("label {label}") }
+        }
     }
-    match inspect_kind(volume) {
-        Kind::Mask { background, .. } => Ok(select_mask(volume, background)),
+}
+
+/// What the mask of a volume of two values is called.
+pub(crate) const MASK: &str = "the mask";
+
+/// Whether a voxel is in the mask of a volume with this background.
+pub(crate) fn is_in_mask(background: f64) -> impl Fn(f64) -> bool + Sync {
+    move |value| value != background && !value.is_nan()
+}
+
+/// The background of a volume of this kind, if it may be taken for a mask.
+pub(crate) fn background(kind: Kind, method: Method) -> Result<f64, Error> {
+    match kind {
+        Kind::Mask { background, .. } => Ok(background),
+        _ if method == Method::Mask => Ok(0.0),
         Kind::Constant { value } => {
             Err(Error::Empty { what: "a volume of one value".to_owned(), min: value, max: value })
         }

@@ -5,7 +5,9 @@
 use std::path::PathBuf;
 
 use espalier_model::{Diagnose, Mask};
-use espalier_volume::{Components, Error, Kind, Method, Params, ReadOptions, inspect_kind, read, segment};
+use espalier_volume::{
+    Components, Error, Kind, Method, Params, ReadOptions, Segmented, inspect_kind, read, read_mask, segment,
+};
 
 fn data() -> Option<PathBuf> {
     let folder = std::env::var_os("ESPALIER_DATA").map(PathBuf::from);
@@ -141,4 +143,34 @@ fn threshold_works_on_scaled_values() {
     let n_by_hand = loaded.volume.map_values(|v| usize::from(v >= 200.0)).iter().sum::<usize>();
     assert_eq!(segmented.mask.n_foreground(), n_by_hand);
     assert_eq!(n_by_hand, 98_873);
+}
+
+/// A mask straight from the file is that of the whole volume, with the same report.
+#[test]
+fn streamed_masks_equal_those_of_whole_volumes() {
+    let Some(data) = data() else { return };
+    let any = || Params { components: Components::All, fill_cavities: false, ..Params::default() };
+    let band = Params { method: Method::Threshold, lower: Some(200.0), ..any() };
+    let cases = [
+        ("airquant_airway.nii.gz", any()),
+        ("kimimaro_neuron_28794499.nii.gz", any()),
+        ("vmtk_aorta_levelset_mask.nii.gz", Params { method: Method::Mask, ..any() }),
+        ("ct_avm_head_cta.nii.gz", band.clone()),
+        ("vmtk_aorta.mha", band.clone()),
+        ("cip_ct64.nrrd", Params { upper: Some(-900.0), ..band }),
+        ("totalseg_example_labels.nii.gz", Params { label: Some(117.0), ..any() }),
+        ("totalseg_pulmonary_ct.nii.gz", airway_params(-865.0)),
+    ];
+    for (name, params) in cases {
+        let path = data.join("volumes").join(name);
+        let loaded = read(&path, &ReadOptions::default()).expect("readable");
+        let whole = segment(&loaded.volume, &params).map_err(|error| error.to_string());
+        let streamed = read_mask(&path, &ReadOptions::default(), &params).map_err(|error| error.to_string());
+        let whole = whole.map(|whole| {
+            let mut report = loaded.report;
+            report.extend(whole.report);
+            Segmented { report, ..whole }
+        });
+        assert_eq!(streamed, whole, "{name}");
+    }
 }

@@ -1,0 +1,127 @@
+//! File → [`Mask`](espalier_model::Mask).
+//!
+//! **Input** a path to a volume file, and [`Params`]. **Output** [`Segmented`], whose report begins with the reader's.
+//! **Steps** 1. where the choice depends on each value alone, the bits of the voxels straight from the file, and what
+//! kind of volume it is; 2. else, or where sheared axes must be made orthogonal, the whole volume; 3. what
+//! [`segment`] does then.
+//! **Guarantees** the same result as [`read`] and [`segment`]; straight from the file, memory is the bits.
+//! **Cost** one pass over the file; a second one for a mask of which some values are not finite, and for a volume of
+//! more than two values that is to be taken for a mask but does not begin with 0.
+
+use std::path::Path;
+
+use espalier_model::{Bits, Report};
+
+use crate::read::{check_limit, count_grid, orthogonal_grid};
+use crate::segment::segment_selection;
+use crate::select::{MASK, Selection, Wish, background, is_in_mask, wish};
+use crate::stored::Stored;
+use crate::stream::{self, Inspected};
+use crate::{Error, Kind, Method, Params, ReadError, ReadOptions, Segmented, read, segment};
+
+/// Reads the volume in a file and makes a mask of it.
+///
+/// # Errors
+/// As [`read`] and [`segment`].
+pub fn read_mask(path: &Path, options: &ReadOptions, params: &Params) -> Result<Segmented, Error> {
+    params.validate()?;
+    let file = File { path, options };
+    let mut report = Report::default();
+    let mut stored = file.open(&mut report)?;
+    let grid = file.named(orthogonal_grid(&stored, options))?;
+    let selection = match grid {
+        Some(_) => file.select(&mut stored, params, &mut report)?,
+        None => None,
+    };
+    let (Some(selection), Some(grid)) = (selection, grid) else {
+        let loaded = read(path, options)?;
+        let segmented = segment(&loaded.volume, params)?;
+        return Ok(after(loaded.report, segmented));
+    };
+    count_grid(&grid, &mut report);
+    let segmented = segment_selection(selection, &grid, params, || {
+        let mut stored = file.open(&mut Report::default())?;
+        let census = file.named(stream::inspect(&mut stored, &mut Report::default()))?.census;
+        Ok((census.min, census.max))
+    })?;
+    Ok(after(report, segmented))
+}
+
+/// The segmented with the reader's report before its own.
+fn after(mut report: Report, segmented: Segmented) -> Segmented {
+    report.extend(segmented.report);
+    Segmented { report, ..segmented }
+}
+
+/// A volume file, to be read once or twice.
+struct File<'a> {
+    path: &'a Path,
+    options: &'a ReadOptions,
+}
+
+impl File<'_> {
+    fn open(&self, report: &mut Report) -> Result<Stored, Error> {
+        self.named(Stored::open(self.path, self.options, report))
+    }
+
+    fn named<T>(&self, result: Result<T, ReadError>) -> Result<T, Error> {
+        result.map_err(|problem| Error::Read { problem, path: self.path.to_owned() })
+    }
+
+    /// The chosen voxels; none if the whole volume is needed to choose them.
+    fn select(
+        &self,
+        stored: &mut Stored,
+        params: &Params,
+        report: &mut Report,
+    ) -> Result<Option<Selection>, Error> {
+        match wish(params) {
+            Wish::Region => Ok(None),
+            Wish::Values { is_wanted, what } => {
+                self.named(check_limit(bits_bytes(stored), self.options))?;
+                let bits = self.named(stream::choose(stored, is_wanted, report))?;
+                Ok(Some(Selection { bits, what }))
+            }
+            Wish::Kind => {
+                self.named(check_limit(bits_bytes(stored), self.options))?;
+                let bits = self.mask_bits(stored, params.method, report)?;
+                Ok(Some(Selection { bits, what: MASK.to_owned() }))
+            }
+        }
+    }
+
+    /// The voxels that are not background, in a volume that says itself which those are.
+    fn mask_bits(&self, stored: &mut Stored, method: Method, report: &mut Report) -> Result<Bits, Error> {
+        let Inspected { census, mut bits, first, is_exact } = self.named(stream::inspect(stored, report))?;
+        let kind = census.kind();
+        let has_two_values = matches!(kind, Kind::Mask { .. });
+        let background = background(kind, method)?;
+        if is_exact && first == background {
+            return Ok(bits);
+        }
+        if is_exact && has_two_values {
+            invert(&mut bits);
+            return Ok(bits);
+        }
+        let mut again = self.open(&mut Report::default())?;
+        self.named(stream::choose(&mut again, is_in_mask(background), &mut Report::default()))
+    }
+}
+
+/// The memory of a volume's bits.
+fn bits_bytes(stored: &Stored) -> u64 {
+    let [nx, ny, nz] = stored.shape.map(|extent| extent as u64);
+    nx.div_ceil(64).saturating_mul(8).saturating_mul(ny).saturating_mul(nz)
+}
+
+/// Turns ones to zeros and zeros to ones.
+fn invert(bits: &mut Bits) {
+    let n_beyond = bits.words_per_row() * 64 - bits.shape()[0];
+    for row in 0..bits.n_rows() {
+        let words = bits.row_mut(row);
+        words.iter_mut().for_each(|word| *word = !*word);
+        if let Some(last) = words.last_mut() {
+            *last &= u64::MAX >> n_beyond;
+        }
+    }
+}
