@@ -2,26 +2,21 @@
 //!
 //! **Input** a tree and rounded positions. **Output** `Certificate`: how many pairs of edges have a point in
 //! common that they should not have, and the first of them.
-//! **Steps** 1. Take the axis along which the layout is longer. 2. Sort edges by their lower end on it. 3. Sweep:
-//! compare each edge with those that start before it ends, by exact orientation predicates.
+//! **Steps** 1. Pairs whose boxes meet, by exact orientation predicates. 2. Edges from one node, in the order of their
+//! directions, which the same predicates tell: of equal ones each pair.
 //! **Guarantees** exact for any finite coordinates: touching and collinear overlap count; edges with a common
 //! node may share that node only; an edge without length always counts against its neighbours. Independent of
 //! every optimiser's own check.
 //! **Source** predicates: `espalier_geom::plane`.
-//! **Cost** O(N log N + pairs whose extents on the axis meet).
+//! **Cost** O(N log N + boxes that meet), see `boxes`.
 
-use espalier_geom::plane::{Segment, intersect, overlap_beyond_hub};
+use std::cmp::Ordering;
+
+use espalier_geom::plane::{Segment, Side, intersect, overlap_beyond_hub, side};
 use espalier_model::{Certificate, Tree};
 use glam::DVec2;
 
-/// The box of an edge, by its lower node, along and across the axis of the sweep.
-struct Span {
-    start: f64,
-    end: f64,
-    bottom: f64,
-    top: f64,
-    node: usize,
-}
+use crate::boxes::{self, EdgeBox};
 
 /// Checks a layout of a tree, exactly: no pair of edges may have a point in common that is no common node.
 ///
@@ -63,49 +58,70 @@ pub fn crossing_pairs(tree: &Tree, positions_mm: &[DVec2], most: usize) -> Vec<(
 /// Counts the pairs that meet, and keeps the first `most`.
 fn sweep(tree: &Tree, positions: &[DVec2], most: usize) -> Certificate {
     assert_eq!(positions.len(), tree.n_nodes(), "one position per node");
-    let low = positions.iter().fold(DVec2::INFINITY, |low, &p| low.min(p));
-    let high = positions.iter().fold(DVec2::NEG_INFINITY, |high, &p| high.max(p));
-    let extent = high - low;
-    let along = |p: DVec2| if extent.x >= extent.y { p.x } else { p.y };
-    let across = |p: DVec2| if extent.x >= extent.y { p.y } else { p.x };
-
-    let span = |node: usize| {
-        let (a, b) = (positions[node], positions[parent_of(tree, node)]);
-        let (start, end) = (along(a).min(along(b)), along(a).max(along(b)));
-        Span { start, end, bottom: across(a).min(across(b)), top: across(a).max(across(b)), node }
-    };
-    let mut edges: Vec<Span> = (1..positions.len()).map(span).collect();
-    edges.sort_unstable_by(|a, b| a.start.total_cmp(&b.start).then(a.node.cmp(&b.node)));
-
     let mut certificate = Certificate::default();
-    for (idx, edge) in edges.iter().enumerate() {
-        for other in edges[idx + 1..].iter().take_while(|other| other.start <= edge.end) {
-            let is_apart = other.bottom > edge.top || edge.bottom > other.top;
-            let pair = (edge.node.min(other.node), edge.node.max(other.node));
-            if !is_apart && meet(tree, positions, pair) {
-                certificate.crossings += 1;
-                certificate.pairs.push(pair);
-            }
-            if certificate.pairs.len() >= 4 * most.max(1) {
-                keep_first(&mut certificate.pairs, most);
-            }
+    let mut count = |a: usize, b: usize| {
+        certificate.crossings += 1;
+        certificate.pairs.push((a.min(b), a.max(b)));
+        if certificate.pairs.len() >= 4 * most.max(1) {
+            keep_first(&mut certificate.pairs, most);
         }
+    };
+    let edge_box = |node: usize| {
+        let parent = parent_of(tree, node);
+        EdgeBox::around((positions[node], positions[parent]), 0.0, (node, parent))
+    };
+    boxes::each_meeting((1..positions.len()).map(edge_box).collect(), |a, b| {
+        if meet(tree, positions, (a, b)) {
+            count(a, b);
+        }
+        true
+    });
+    for hub in 0..positions.len() {
+        each_overlap_at(tree, positions, hub, &mut count);
     }
     keep_first(&mut certificate.pairs, most);
     certificate
 }
 
-/// Whether two edges, by their lower nodes and `a` before `b`, meet where they should not.
+/// Whether two edges from different nodes, by their lower nodes and `a` before `b`, meet where they should not.
 fn meet(tree: &Tree, positions: &[DVec2], (a, b): (usize, usize)) -> bool {
     let (parent_a, parent_b) = (parent_of(tree, a), parent_of(tree, b));
     if parent_b == a {
-        overlap_beyond_hub(positions[a], positions[parent_a], positions[b])
-    } else if parent_a == parent_b {
-        overlap_beyond_hub(positions[parent_a], positions[a], positions[b])
-    } else {
-        let segment_a = Segment { a: positions[parent_a], b: positions[a] };
-        intersect(&segment_a, &Segment { a: positions[parent_b], b: positions[b] })
+        return overlap_beyond_hub(positions[a], positions[parent_a], positions[b]);
     }
+    let segment_a = Segment { a: positions[parent_a], b: positions[a] };
+    intersect(&segment_a, &Segment { a: positions[parent_b], b: positions[b] })
+}
+
+/// Visits the pairs of edges from a node that have more than it in common: those of one direction, and an edge without
+/// length with every other.
+fn each_overlap_at(tree: &Tree, positions: &[DVec2], hub: usize, visit: &mut impl FnMut(usize, usize)) {
+    let (at, children) = (positions[hub], tree.children(hub));
+    if children.len() < 2 {
+        return;
+    }
+    let (points, mut others): (Vec<usize>, Vec<usize>) =
+        children.iter().partition(|&&child| positions[child] == at);
+    for (idx, &point) in points.iter().enumerate() {
+        points[idx + 1..].iter().chain(&others).for_each(|&other| visit(point, other));
+    }
+    others.sort_unstable_by(|&a, &b| by_direction(at, positions[a], positions[b]).then(a.cmp(&b)));
+    for same in others.chunk_by(|&a, &b| by_direction(at, positions[a], positions[b]).is_eq()) {
+        for (idx, &a) in same.iter().enumerate() {
+            same[idx + 1..].iter().for_each(|&b| visit(a, b));
+        }
+    }
+}
+
+/// The order of two points by their directions from a third, counter-clockwise from that of +x; exact.
+fn by_direction(hub: DVec2, a: DVec2, b: DVec2) -> Ordering {
+    // Signs of coordinate differences are those of comparisons, which are exact.
+    let is_lower_half = |p: DVec2| p.y < hub.y || (p.y == hub.y && p.x < hub.x);
+    is_lower_half(a).cmp(&is_lower_half(b)).then_with(|| match side(hub, a, b) {
+        Side::Left => Ordering::Less,
+        Side::On => Ordering::Equal,
+        Side::Right => Ordering::Greater,
+    })
 }
 
 /// The node at the upper end of the edge of a node; edges have one, since the root is no edge's lower node.

@@ -4,13 +4,17 @@
 //! a limit. **Notation** a run is 8 edges next to each other in preorder, hence mostly a piece of a chain.
 //! **Steps** 1. Box of each edge, in single precision and rounded outwards, so that a run's boxes fill vector
 //! registers; box of each run. 2. Sort runs by their left border and sweep. 3. Where two run boxes meet: which
-//! edges of one reach the other, which of those boxes meet, then segment against segment in double precision.
+//! edges of one reach the other, which of those boxes meet, then segment against segment in double precision. 4. Runs
+//! of edges that all come from one node are left out of 3: of those, in the order of their angles, neighbours.
 //! **Guarantees** strict: edges that come nearer than 1e-6 of the median edge length count as meeting, and
 //! siblings within 1e-6 rad, so that what has no crossing here has none after rounding, in the exact check.
 //! A parent and its child never meet: r_a ≥ −0.97 keeps them apart. Same count for any limit that is not reached.
 //! **Differs from the source** [Hu2022] checks coarse, then fine, over all pairs on a GPU.
 //! **Cost** O(N log N + boxes that meet) time; no allocation after the first call.
 
+use std::f64::consts::{PI, TAU};
+
+use espalier_geom::math;
 use glam::DVec2;
 
 use crate::problem::Problem;
@@ -19,6 +23,8 @@ use crate::problem::Problem;
 const RUN: usize = 8;
 /// The tolerance as a share of the median edge length, and the least angle between siblings in rad.
 pub(crate) const TOLERANCE: f64 = 1e-6;
+/// Edges from one node whose directions differ by more do not meet.
+const SAME_DIRECTION_RAD: f64 = 2.0 * TOLERANCE;
 /// Two units in the last place of single precision, by which a border is moved outwards.
 const OUTWARDS: f32 = 2.4e-7;
 
@@ -44,7 +50,12 @@ struct Box2 {
 struct RunBox {
     bounds: Box2,
     run: u32,
+    /// The node from which all edges of the run come, or `MIXED`.
+    hub: u32,
 }
+
+/// The hub of a run whose edges come from several nodes.
+const MIXED: u32 = u32::MAX;
 
 /// The boxes of up to eight edges; lanes without an edge meet nothing.
 #[derive(Clone, Copy)]
@@ -97,8 +108,13 @@ impl Lanes {
 
 /// Whether no pair of edges meets.
 pub(crate) fn is_planar(problem: &Problem, positions: &[DVec2]) -> bool {
+    count_at(problem, positions, 0) == 0
+}
+
+/// As [`count`], of points.
+pub(crate) fn count_at(problem: &Problem, positions: &[DVec2], limit: usize) -> usize {
     let (x, y): (Vec<f64>, Vec<f64>) = positions.iter().map(|p| (p.x, p.y)).unzip();
-    count(problem, &x, &y, 0, &mut Scratch::default()) == 0
+    count(problem, &x, &y, limit, &mut Scratch::default())
 }
 
 /// The number of meeting pairs, or any number above `limit` if there are more than that.
@@ -112,10 +128,11 @@ pub(crate) fn count(problem: &Problem, x: &[f64], y: &[f64], limit: usize, scrat
     runs.sort_unstable_by(|a, b| a.bounds.x_low.total_cmp(&b.bounds.x_low).then(a.run.cmp(&b.run)));
 
     let mut n_met = 0;
-    for (place, &RunBox { bounds, run }) in runs.iter().enumerate() {
+    for (place, &RunBox { bounds, run, hub }) in runs.iter().enumerate() {
         n_met += check.within_run(lanes, run as usize);
         for other in runs[place + 1..].iter().take_while(|other| other.bounds.x_low <= bounds.x_high) {
-            if other.bounds.y_low <= bounds.y_high && bounds.y_low <= other.bounds.y_high {
+            let is_apart = other.bounds.y_low > bounds.y_high || bounds.y_low > other.bounds.y_high;
+            if !(is_apart || is_same_fan(hub, other.hub)) {
                 n_met += check.between_runs(lanes, run as usize, other);
                 if n_met > limit {
                     return n_met;
@@ -126,7 +143,7 @@ pub(crate) fn count(problem: &Problem, x: &[f64], y: &[f64], limit: usize, scrat
             return n_met;
         }
     }
-    n_met
+    n_met + check.between_fans(runs, limit.saturating_sub(n_met))
 }
 
 struct Check<'a> {
@@ -162,8 +179,47 @@ impl Check<'_> {
                 all.y_low = all.y_low.min(y_low);
                 all.y_high = all.y_high.max(y_high);
             }
-            scratch.runs.push(RunBox { bounds: all, run: run as u32 });
+            let edges = run * RUN + 1..(run * RUN + RUN).min(n_edges) + 1;
+            let hub = self.problem.parent[edges.start];
+            let is_fan = self.problem.parent[edges].iter().all(|&parent| parent == hub);
+            scratch.runs.push(RunBox { bounds: all, run: run as u32, hub: if is_fan { hub } else { MIXED } });
         }
+    }
+
+    /// How many edges of different runs from one hub point the same way, up to one more than a limit.
+    ///
+    /// All boxes at the middle of a star meet, but in the order of their angles only neighbours can.
+    fn between_fans(&self, runs: &[RunBox], limit: usize) -> usize {
+        let mut fans: Vec<(u32, u32)> =
+            runs.iter().filter(|run| run.hub != MIXED).map(|run| (run.hub, run.run)).collect();
+        fans.sort_unstable();
+        let mut n_met = 0;
+        for fan in fans.chunk_by(|a, b| a.0 == b.0).filter(|fan| fan.len() > 1) {
+            let (hub, n_edges) = (fan[0].0 as usize, self.x.len() - 1);
+            let edges = |run: usize| run * RUN..(run * RUN + RUN).min(n_edges);
+            let edges = fan.iter().flat_map(|&(_, run)| edges(run as usize));
+            let angle =
+                |edge: usize| math::atan2(self.y[edge + 1] - self.y[hub], self.x[edge + 1] - self.x[hub]);
+            let mut order: Vec<(f64, usize)> = edges.map(|edge| (angle(edge), edge)).collect();
+            order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            // The first ones follow the last ones.
+            let n_after = order.partition_point(|&(angle, _)| angle <= SAME_DIRECTION_RAD - PI);
+            let n_edges = order.len();
+            order.extend_from_within(..n_after);
+            order[n_edges..].iter_mut().for_each(|(angle, _)| *angle += TAU);
+            for (place, &(angle, edge)) in order[..n_edges].iter().enumerate() {
+                let near =
+                    order[place + 1..].iter().take_while(|other| other.0 <= angle + SAME_DIRECTION_RAD);
+                let is_met = |&&(_, other): &&(f64, usize)| {
+                    edge / RUN != other / RUN && self.pair_meets(edge.min(other), edge.max(other))
+                };
+                n_met += near.filter(is_met).count();
+                if n_met > limit {
+                    return n_met;
+                }
+            }
+        }
+        n_met
     }
 
     fn within_run(&self, lanes: &[Lanes], run: usize) -> usize {
@@ -217,6 +273,12 @@ impl Check<'_> {
             segments_meet(edge_a, edge_b, self.tolerance)
         }
     }
+}
+
+/// Whether two runs are of edges from one node.
+#[inline]
+fn is_same_fan(hub: u32, other: u32) -> bool {
+    hub != MIXED && hub == other
 }
 
 /// The interval between two numbers, grown by half the tolerance and rounded outwards.

@@ -52,19 +52,19 @@ fn pairs(nodes: &[usize], distance: impl Fn(usize, usize) -> f64) -> Vec<f64> {
     list
 }
 
-/// Ranks from 0; ties share the mean of theirs.
+/// Ranks of distances, from 0; ties share the mean of theirs.
 fn ranks(values: &[f64]) -> Vec<f64> {
-    let mut order: Vec<u32> = (0..values.len() as u32).collect();
-    order.par_sort_unstable_by(|&a, &b| values[a as usize].total_cmp(&values[b as usize]).then(a.cmp(&b)));
+    // Numbers that are not negative are in the order of their bits, and whole numbers beside their places sort three
+    // times as fast as places by numbers elsewhere.
+    let mut order: Vec<(u64, u32)> = (0..).zip(values).map(|(idx, value)| (value.to_bits(), idx)).collect();
+    order.par_sort_unstable();
     let mut ranks = vec![0.0; values.len()];
     let mut start = 0;
-    while start < order.len() {
-        let value = values[order[start] as usize];
-        let n_equal = order[start..].iter().take_while(|&&idx| values[idx as usize] == value).count();
-        for &idx in &order[start..start + n_equal] {
-            ranks[idx as usize] = start as f64 + 0.5 * (n_equal - 1) as f64;
+    for equal in order.chunk_by(|a, b| a.0 == b.0) {
+        for &(_, idx) in equal {
+            ranks[idx as usize] = start as f64 + 0.5 * (equal.len() - 1) as f64;
         }
-        start += n_equal;
+        start += equal.len();
     }
     ranks
 }

@@ -3,11 +3,11 @@
 //! | step | file | what |
 //! |--:|---|---|
 //! | 1 | `targets`, `siblings` | target angles, lengths and headings from the tree and its views |
-//! | 2 | `problem`, `weights`, `ratio` | the frozen problem; the user's weights; equation 3 between angles and ratios |
+//! | 2 | `problem`, `weights`, `ratio`, `prospect` | the frozen problem; the user's weights; equation 3 between angles and ratios; whether a search is worth it |
 //! | 3 | `layout/…` | the methods: `projection`, `radial`, `cone`, `marino`, `pso` (with `start`) |
 //! | 4 | `batch`, `trig`, `crossing` | the swarm's energy, many particles at once, and its strict crossing count |
 //! | 5 | `pose` | one rigid motion of the whole, mirrored or not; rounding to what is written |
-//! | 6 | `certify`, `widths/…` | the exact certificate; layouts at the widths of their tubes |
+//! | 6 | `certify`, `widths/…`, `boxes` | the exact certificate; layouts at the widths of their tubes; boxes that meet |
 //! | 7 | `energy`, `losses/…`, `distances` | the one energy and all losses, for every method alike |
 //! | 8 | `select`, `never_worse` | the best certified layout, and the table of all; the last look at it |
 //! | 9 | `replay`, `pins` | manual edits in it: branches turned and pinned, the rest laid around them |
@@ -19,6 +19,7 @@
 //! **Source** [Hu2022] sections 3.2 and 5.1.
 
 mod batch;
+mod boxes;
 mod certify;
 #[cfg(test)]
 mod checks;
@@ -39,6 +40,7 @@ mod pins;
 mod place;
 mod pose;
 mod problem;
+mod prospect;
 mod ratio;
 mod replay;
 mod select;

@@ -18,6 +18,19 @@ const TOLERANCE: f64 = 1e-6;
 /// The clearance is at most this share of the path between two edges: near a fork edges have to be near.
 pub(crate) const GAP_SHARE: f64 = 0.2;
 
+/// Whether two segments are farther apart than a margin for sure: one lies on one side of the line through the other,
+/// farther off than that.
+pub(crate) fn are_apart(s: &Segment, t: &Segment, margin_mm: f64) -> bool {
+    let is_beside = |s: &Segment, t: &Segment| {
+        let along = s.b - s.a;
+        let (from, to) = (along.perp_dot(t.a - s.a), along.perp_dot(t.b - s.a));
+        // |x| + |y| is no less than the length, and needs no root.
+        let margin = margin_mm * (along.x.abs() + along.y.abs());
+        from.min(to) > margin || from.max(to) < -margin
+    };
+    is_beside(s, t) || is_beside(t, s)
+}
+
 /// The rule of separation of a problem.
 pub(crate) struct Separation {
     pub(crate) paths: Paths,

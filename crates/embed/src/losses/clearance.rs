@@ -5,67 +5,56 @@
 //! `separation`: edges without a common node keep at least c, or a fifth of the path along the tree between their near
 //! ends if that is less. So it is the least distance d of a pair with d < path / 5, or the median edge if no such pair
 //! is that near. 0 where edges cross.
-//! **Steps** sweep along the longer side of the box; a pair is measured only if its boxes are nearer than the least
-//! distance so far, which soon is small.
+//! **Steps** pairs whose boxes, grown by half a margin, meet. The margin is small at first: where a pair is nearer than
+//! that, it is found among few; where none is, it grows.
 //! **Guarantees** the minimum over all pairs, whatever the order.
-//! **Cost** O(N log N + pairs whose extents along the axis are that near).
+//! **Cost** O(N log N + boxes that are that near), see `boxes`.
 
 use espalier_geom::plane::segment_distance;
 use glam::DVec2;
 
+use crate::boxes::{self, EdgeBox};
 use crate::paths::Paths;
 use crate::problem::Problem;
-use crate::separation::{GAP_SHARE, segment};
+use crate::separation::{GAP_SHARE, are_apart, segment};
 
-/// The box of an edge, along and across the axis of the sweep.
-struct Span {
-    start: f64,
-    end: f64,
-    bottom: f64,
-    top: f64,
-    node: usize,
-    parent: usize,
-}
+/// The margins, as shares of the median edge length.
+const MARGINS: [f64; 3] = [0.01, 0.1, 1.0];
 
 /// The clearance of a layout, in mm.
 pub(super) fn clearance_mm(problem: &Problem, positions: &[DVec2]) -> f64 {
     let paths = Paths::new(&problem.parent, &problem.targets.length_mm);
-    let spans = spans(problem, positions);
     let mut least_mm = problem.scale_mm;
-    for (idx, a) in spans.iter().enumerate() {
-        for b in &spans[idx + 1..] {
-            if b.start > a.end + least_mm {
-                break;
+    for margin_mm in MARGINS.map(|share| share * problem.scale_mm) {
+        each_near(problem, positions, margin_mm, |a, b| {
+            let (s, t) = (segment(problem, positions, a), segment(problem, positions, b));
+            if are_apart(&s, &t, least_mm) {
+                return;
             }
-            let is_apart = b.bottom > a.top + least_mm || a.bottom > b.top + least_mm;
-            let is_neighbour = a.parent == b.parent || a.parent == b.node || b.parent == a.node;
-            if is_apart || is_neighbour {
-                continue;
-            }
-            let distance_mm =
-                segment_distance(&segment(problem, positions, a.node), &segment(problem, positions, b.node));
-            if distance_mm < least_mm && distance_mm < GAP_SHARE * paths.gap_mm(a.node, b.node) {
+            let distance_mm = segment_distance(&s, &t);
+            if distance_mm < least_mm && distance_mm < GAP_SHARE * paths.gap_mm(a, b) {
                 least_mm = distance_mm;
             }
+        });
+        if least_mm <= margin_mm {
+            break;
         }
     }
     least_mm
 }
 
-/// The edges in the order in which they start along the longer side of the box.
-fn spans(problem: &Problem, positions: &[DVec2]) -> Vec<Span> {
-    let low = positions.iter().fold(DVec2::INFINITY, |low, &p| low.min(p));
-    let extent = positions.iter().fold(DVec2::NEG_INFINITY, |high, &p| high.max(p)) - low;
-    let turned = |p: DVec2| if extent.x >= extent.y { p } else { p.perp() };
-    let span = |node: usize| {
+/// Visits the pairs of edges without a common node whose boxes are nearer than a margin.
+fn each_near(problem: &Problem, positions: &[DVec2], margin_mm: f64, mut visit: impl FnMut(usize, usize)) {
+    let edge_box = |node: usize| {
         let parent = problem.parent[node] as usize;
-        let (a, b) = (turned(positions[node]), turned(positions[parent]));
-        let (low, high) = (a.min(b), a.max(b));
-        Span { start: low.x, end: high.x, bottom: low.y, top: high.y, node, parent }
+        EdgeBox::around((positions[node], positions[parent]), 0.5 * margin_mm, (node, parent))
     };
-    let mut spans: Vec<Span> = (1..positions.len()).map(span).collect();
-    spans.sort_unstable_by(|a, b| a.start.total_cmp(&b.start).then(a.node.cmp(&b.node)));
-    spans
+    boxes::each_meeting((1..positions.len()).map(edge_box).collect(), |a, b| {
+        if problem.parent[b] as usize != a {
+            visit(a, b);
+        }
+        true
+    });
 }
 
 #[cfg(test)]

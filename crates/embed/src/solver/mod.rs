@@ -14,7 +14,8 @@
 //!
 //! **Input** the problem, and crossing-free headings. **Output** a layout without crossings, why the search ended,
 //! and the curve of its energy.
-//! **Steps** Where the targets themselves do not cross there is nothing to do. Else both starts, each on a thread of
+//! **Steps** Where the targets themselves do not cross there is nothing to do; where they cross everywhere, the cone is
+//! brought down a little. Else both starts, each on a thread of
 //! its own: descend; then barrier and descent in turn until a round gains less than 3 %. The better one wins.
 //! A thread, a tree of next to nothing but chain, is only brought down from the cone: all parts together lower the
 //! energy of 100,000 turns in one segment by half a percent, in 40 s.
@@ -42,20 +43,22 @@ mod work;
 
 use espalier_model::{Termination, TracePoint};
 
+use crate::energy;
 use crate::layout::{Aim, Layout};
 use crate::params::{Params, SolverParams};
 use crate::problem::Problem;
+use crate::prospect::Prospect;
 use crate::separation::Separation;
-use crate::{crossing, energy};
 pub(crate) use repair::repair;
 pub(crate) use shape::Shape;
 pub(crate) use work::Work;
 
 /// Units of work that a start may take, for each edge (but see `Problem::n_joints`), and in all: 6 billion take two to
-/// three minutes. A neuron of 50,000 nodes ends at 27° with a quarter of them, and at 2° with all of them and four
-/// times the search for sides.
+/// three minutes, which is what a neuron of 50,000 nodes needs (see `mirrors`).
 const WORK_PER_EDGE: u64 = 150_000;
 const MOST_WORK: u64 = 6_000_000_000;
+/// The units that a crowded tree may take, which nothing brings near its targets: a quarter of a second.
+const CROWDED_WORK: f64 = 1e7;
 /// What untangling may take of the work; a hemibrain neuron of 4332 nodes with two crossings left needs more than a
 /// quarter of it.
 const UNTANGLING_SHARE: f64 = 0.6;
@@ -68,12 +71,20 @@ const LEAST_GAIN: f64 = 0.03;
 pub(crate) fn layout(problem: &Problem, cone: &[f64], params: &Params) -> Layout {
     let separation = Separation::new(problem, params.solver.clearance);
     let targets = Shape::targets(problem);
-    if crossing::is_planar(problem, &targets.positions(problem)) {
+    let prospect = Prospect::of(problem);
+    if prospect == Prospect::Free {
         let mut run = Run::new(problem, &params.solver, targets);
         run.record();
-        return run.into_layout(Termination::Optimal);
+        return run.end();
     }
     let cone = Shape::from_headings(problem, cone);
+    if prospect == Prospect::Crowded {
+        let mut run = Run::new(problem, &params.solver, cone);
+        run.work.limit = run.work.limit.min((params.solver.effort * CROWDED_WORK) as u64);
+        run.record();
+        run.descend(&separation, 1.0);
+        return run.end();
+    }
     let from_cone = || {
         let mut run = Run::new(problem, &params.solver, cone.clone());
         run.improve(&separation);
@@ -91,14 +102,7 @@ pub(crate) fn layout(problem: &Problem, cone: &[f64], params: &Params) -> Layout
     } else {
         from_cone()
     };
-    let termination = if best.is_lossless() {
-        Termination::Optimal
-    } else if best.work.is_spent() {
-        Termination::BudgetSpent
-    } else {
-        Termination::Converged
-    };
-    best.into_layout(termination)
+    best.end()
 }
 
 /// One start on its way.
@@ -129,7 +133,7 @@ impl<'a> Run<'a> {
         if self.is_lossless() {
             return;
         }
-        self.descend(separation);
+        self.descend(separation, DESCENT_SHARE);
         let mut is_first = true;
         while self.params.barrier && !self.problem.is_thread() && !self.work.is_spent() {
             let before = self.energy();
@@ -137,17 +141,18 @@ impl<'a> Run<'a> {
                 barrier::relax(run.problem, separation, &mut run.shape, (is_first, &mut run.work));
             });
             is_first = false;
-            self.descend(separation);
+            self.descend(separation, DESCENT_SHARE);
             if before - self.energy() < LEAST_GAIN * before {
                 break;
             }
         }
     }
 
-    fn descend(&mut self, separation: &Separation) {
+    /// Descends with a share of the work.
+    fn descend(&mut self, separation: &Separation, share: f64) {
         if self.params.descent {
             self.keep_if_better(|run| {
-                let mut slice = run.work.slice(DESCENT_SHARE);
+                let mut slice = run.work.slice(share);
                 descent::descend(run.problem, separation, &mut run.shape, &mut slice);
                 run.work.add(slice);
             });
@@ -187,7 +192,15 @@ impl<'a> Run<'a> {
         });
     }
 
-    fn into_layout(self, termination: Termination) -> Layout {
+    /// The layout that was found.
+    fn end(self) -> Layout {
+        let termination = if self.is_lossless() {
+            Termination::Optimal
+        } else if self.work.is_spent() {
+            Termination::BudgetSpent
+        } else {
+            Termination::Converged
+        };
         Layout {
             name: "solver".to_owned(),
             positions: self.shape.positions(self.problem),

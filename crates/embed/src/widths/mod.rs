@@ -50,12 +50,12 @@ pub(crate) struct Changed {
 
 /// What the params ask for where tubes overlap; nothing if none do, or if nothing better was found.
 pub(crate) fn change(problem: &Problem, positions: &[DVec2], params: &Params) -> Option<Changed> {
-    let found = measure(problem, positions);
-    if found.overlaps == 0 || !found.is_complete {
-        return None;
-    }
     let mode = params.widths.mode;
     if mode == WidthsMode::Report {
+        return None;
+    }
+    let found = measure(problem, positions);
+    if found.overlaps == 0 || !found.is_complete {
         return None;
     }
     let shape = avoid::avoid(problem, &params.solver, &nearest_shape(problem, positions));

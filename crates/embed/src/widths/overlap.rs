@@ -8,10 +8,10 @@
 //! **Junction disc** for tubes r_i, r_j that part at the gap g: radius √(r_i² + r_j² + 2 r_i r_j cos g) / sin g
 //! for g ≤ 90°, r_i + r_j above, but never more than the shorter of the two branches: edges are often shorter
 //! than the organ is thick.
-//! **Steps** 1. Sweep over boxes grown by the radius. 2. Distance of centrelines. 3. Lowest common ancestor by a
+//! **Steps** 1. Pairs whose boxes, grown by the radius, meet. 2. Distance of centrelines. 3. Lowest common ancestor by a
 //! sparse table over the preorder. 4. Path and disc.
-//! **Guarantees** exact up to 20 million pairs whose boxes meet, a lower bound beyond.
-//! **Cost** O(N log N + boxes that meet).
+//! **Guarantees** exact up to 20 million pairs whose boxes meet, of which a million may meet; a lower bound beyond.
+//! **Cost** O(N log N + boxes that meet), see `boxes`.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -19,11 +19,15 @@ use espalier_geom::math;
 use espalier_geom::plane::{Segment, segment_distance};
 use glam::DVec2;
 
+use crate::boxes::{self, EdgeBox};
 use crate::paths::Ancestors;
 use crate::problem::Problem;
+use crate::separation::are_apart;
 
-/// The most pairs that are looked at: a tree whose radii are in another unit than its positions has billions.
+/// The most pairs that are looked at, and of those that meet: a tree whose radii are in another unit than its positions
+/// has billions, and the projection of a bushy one has millions.
 const MOST_PAIRS: u64 = 20_000_000;
+const MOST_MEETINGS: u64 = 1_000_000;
 
 /// Two edges whose capsules meet.
 #[derive(Clone, Copy, Debug)]
@@ -50,26 +54,19 @@ impl Meeting {
 /// Visits the pairs of edges without a common node whose capsules meet; false if there were too many to look at all.
 pub(super) fn each_meeting(problem: &Problem, positions: &[DVec2], mut visit: impl FnMut(&Meeting)) -> bool {
     let tubes = Tubes::new(problem, positions);
-    let low: Vec<DVec2> = (0..positions.len()).map(|node| tubes.bounds(node).0).collect();
-    let mut order: Vec<usize> = (1..positions.len()).collect();
-    order.sort_by(|&a, &b| low[a].x.total_cmp(&low[b].x).then(a.cmp(&b)));
-    let mut n_pairs = 0_u64;
-    for (place, &a) in order.iter().enumerate() {
-        let (low_a, high_a) = tubes.bounds(a);
-        for &b in order[place + 1..].iter().take_while(|&&b| low[b].x <= high_a.x) {
-            if low[b].y > high_a.y || low_a.y > tubes.bounds(b).1.y {
-                continue;
-            }
-            n_pairs += 1;
-            if n_pairs > MOST_PAIRS {
-                return false;
-            }
-            if let Some(meeting) = tubes.meeting(a.min(b), a.max(b)) {
-                visit(&meeting);
-            }
+    let (mut n_pairs, mut n_meetings) = (0, 0);
+    let tube_box = |node: usize| {
+        let (Segment { a, b }, parent) = (tubes.segment(node), problem.parent[node] as usize);
+        EdgeBox::around((a, b), tubes.radius[node], (node, parent))
+    };
+    boxes::each_meeting((1..positions.len()).map(tube_box).collect(), |a, b| {
+        n_pairs += 1;
+        if let Some(meeting) = tubes.meeting(a, b) {
+            n_meetings += 1;
+            visit(&meeting);
         }
-    }
-    true
+        n_pairs < MOST_PAIRS && n_meetings < MOST_MEETINGS
+    })
 }
 
 /// The tubes of a layout.
@@ -104,20 +101,18 @@ impl<'a> Tubes<'a> {
         self.radius[edge]
     }
 
-    /// The box of an edge's capsule.
-    fn bounds(&self, node: usize) -> (DVec2, DVec2) {
-        let Segment { a, b } = self.segment(node);
-        (a.min(b) - self.radius[node], a.max(b) + self.radius[node])
-    }
-
     /// Edges a < b, if they have no common node and their capsules meet.
     fn meeting(&self, a: usize, b: usize) -> Option<Meeting> {
         let (parent_a, parent_b) = (self.problem.parent[a] as usize, self.problem.parent[b] as usize);
         if parent_b == a || parent_a == parent_b {
             return None;
         }
-        let distance_mm = segment_distance(&self.segment(a), &self.segment(b));
-        (distance_mm < self.radius[a] + self.radius[b]).then(|| self.relation(a, b, distance_mm))
+        let (s, t, reach_mm) = (self.segment(a), self.segment(b), self.radius[a] + self.radius[b]);
+        if are_apart(&s, &t, reach_mm) {
+            return None;
+        }
+        let distance_mm = segment_distance(&s, &t);
+        (distance_mm < reach_mm).then(|| self.relation(a, b, distance_mm))
     }
 
     /// What the tree says of edges a < b without a common node.

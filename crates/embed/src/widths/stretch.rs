@@ -12,20 +12,13 @@ use glam::DVec2;
 use super::overlap::{Meeting, each_meeting};
 use crate::problem::Problem;
 
-/// More pairs than this are not sorted: radii in another unit than lengths.
-const MOST_PAIRS: usize = 4_000_000;
 /// A step beyond the end of an interval, for rounding.
 const BEYOND: f64 = 1e-9;
 
 /// The least scale without overlaps; none if edges cross or there are too many pairs.
 pub(super) fn least_scale(problem: &Problem, positions: &[DVec2]) -> Option<f64> {
     let mut intervals = Vec::new();
-    let is_complete = each_meeting(problem, positions, |meeting| {
-        if intervals.len() < MOST_PAIRS {
-            intervals.push(overlapping(meeting));
-        }
-    });
-    if !is_complete || intervals.len() == MOST_PAIRS {
+    if !each_meeting(problem, positions, |meeting| intervals.push(overlapping(meeting))) {
         return None;
     }
     intervals.sort_by(|a, b| a.0.total_cmp(&b.0));

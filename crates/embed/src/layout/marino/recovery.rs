@@ -15,6 +15,7 @@ use glam::DVec2;
 use super::circles::{Circles, Motion};
 use crate::place;
 use crate::problem::Problem;
+use crate::prospect::Prospect;
 use crate::solver::Work;
 
 /// κ, the share of Δ that one step takes. Small steps let siblings make way for each other.
@@ -28,6 +29,8 @@ const MAX_SWEEPS: usize = 400;
 /// The most work, in pairs of circles: 4 to 8 s. A neuron of 10,000 nodes takes nearly all of it, one of 50,000 and a
 /// chain of 100,000 end after some 20 sweeps, with an eighth of what they could gain still to go.
 const MAX_WORK: u64 = 600_000_000;
+/// The same where angles as in space would cross all over: there is no layout for the view to be like.
+const MAX_WORK_CROWDED: u64 = 10_000_000;
 /// The most work per step, on average over all steps and one more for each node. Neurons take 300 to 700; the children
 /// of a star all meet at its middle, so that a star of 10,000 would take 20,000.
 const MAX_WORK_PER_STEP: u64 = 1_000;
@@ -51,7 +54,8 @@ pub(super) fn recover(problem: &Problem, heading_rad: &[f64], mut off_rad: Vec<f
         .map(|node| heading_rad[node] - heading_rad[problem.parent[node] as usize])
         .collect();
     let mut circles = Circles::new(problem, &place::from_headings(problem, heading_rad));
-    let mut work = Work::up_to(MAX_WORK);
+    let is_crowded = Prospect::of(problem) == Prospect::Crowded;
+    let mut work = Work::up_to(if is_crowded { MAX_WORK_CROWDED } else { MAX_WORK });
     let order = breadth_first(problem);
     let mut residual_rad = vec![residual(&off_rad)];
     let mut n_tried = 0;

@@ -51,6 +51,7 @@ use rayon::prelude::*;
 use crate::choices::{KeepOut, Method};
 use crate::params::{Params, SolverParams};
 use crate::problem::Problem;
+use crate::prospect::Prospect;
 use crate::siblings;
 use anneal::{Phase, Walker};
 use setting::Setting;
@@ -60,9 +61,14 @@ use state::{Prices, State};
 
 /// The evaluations of one walk are this much at most, times N (but no more than `Problem::n_joints`) to the power
 /// below: 70,000 for 235 nodes, 200,000 for
-/// 1000, 3 million for 60,000, where one takes 1, 4 and 20 µs.
+/// 1000, where one takes 1 and 4 µs.
 const EVALUATIONS: f64 = 1800.0;
 const EVALUATIONS_POWER: f64 = 0.68;
+/// From this size on walks are as much longer as the tree is larger, up to a limit. A neuron of 50,000 nodes, which has
+/// four times the evaluations by this, ends at 1.8° after 279 s, and at 27° with a quarter of them and of the solver's
+/// work; `marino` ends at 14°.
+const LARGE: f64 = 10_000.0;
+const MOST_LONGER: f64 = 4.0;
 /// The prices of everything but crossings in the rounds, as shares of the full ones. At full prices a vessel of 1076
 /// nodes keeps 5 crossings and an airway of 2284 nodes 16; at a third the vessel ends at 0, at a tenth the airway
 /// keeps 5 in the same time. But headings and forks come out best at full prices, so these stand first.
@@ -117,6 +123,19 @@ pub(crate) fn mirrored<'t>(
     if !(wants_solver && params.solver.mirrors) || problem.is_thread() {
         return (None, report);
     }
+    match Prospect::of(problem) {
+        Prospect::Free if params.solver.root_keep_out != KeepOut::On => {
+            report.count_usize("mirror_crossings_before", 0);
+            return (None, report);
+        }
+        Prospect::Crowded => {
+            let message = "exact angles cross each other all over: the sides of turns are not searched, and the \
+                           solver does little";
+            report.warn("W-EMBED-CROWDED", message);
+            return (None, report);
+        }
+        _ => {}
+    }
     let found = search(problem, &params.solver, seed);
     report.count_usize("mirror_crossings_before", found.terms_at_start.crossings);
     report.count_usize("mirror_crossings", found.terms.crossings);
@@ -160,7 +179,7 @@ pub(crate) fn search(problem: &Problem, params: &SolverParams, seed: u64) -> Mir
     let full = prices(problem, 1.0);
     let judge = Prices { near: POLISH_NEAR_PRICE, placement: 2.0 * full.placement, ..full };
     let mut walkers = vec![Walker::new(state, judge); N_WALKS];
-    let n_evaluations = params.effort * EVALUATIONS * math::pow(problem.n_joints() as f64, EVALUATIONS_POWER);
+    let n_evaluations = params.effort * most_evaluations(problem.n_joints() as f64);
     let mut share_left = 1.0;
     for (round, share) in (0..).zip(ROUNDS) {
         let phase = Phase {
@@ -191,6 +210,11 @@ pub(crate) fn search(problem: &Problem, params: &SolverParams, seed: u64) -> Mir
     };
     settle_side_by_side(&mut walkers, &settling, seed);
     finish(problem, walkers, terms_at_start)
+}
+
+/// The evaluations of one walk for a tree of that size.
+fn most_evaluations(n_joints: f64) -> f64 {
+    EVALUATIONS * math::pow(n_joints, EVALUATIONS_POWER) * (n_joints / LARGE).clamp(1.0, MOST_LONGER)
 }
 
 /// Whether one branch leaves the root and is thicker than any other: a trunk, as a trachea or an aorta is.
