@@ -1,5 +1,7 @@
 //! Helpers of the end-to-end suite.
 
+pub mod degenerate;
+
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 

@@ -94,6 +94,7 @@ fn runs_hold_whatever_their_settings() {
     for overrides in [
         vec![],
         vec![set("embed.method", "radial")],
+        vec![set("embed.widths.mode", "avoid"), set("input.radius_scale", 3.0)],
         vec![set("embed.method", "pso"), set("embed.targets", "projected"), set("embed.pso.freedom", "s")],
         vec![set("embed.w_side", 2.0), set("embed.w_crossing", 500.0), set("embed.pose", "view")],
         vec![set(
@@ -155,6 +156,22 @@ fn what_is_changed_is_found() {
         let found = failures(changed.path());
         assert!(found.iter().any(|failure| failure == claim), "{claim}: {found:?}");
     }
+
+    // A number of the widths, the way the picture lies, a point of the search.
+    for (array, place, claim) in [
+        ("\"radius_scale\":", 0, "embedding.json: widths: radius scale"),
+        ("\"area_needed_mm2\":", 0, "embedding.json: widths: area needed"),
+        ("\"area_available_mm2\":", 0, "embedding.json: widths: area available"),
+        ("\"length_scale\":", 0, "embedding.json: widths: length scale"),
+    ] {
+        let changed = change(embedding, true, &|text| change_number(text, array, place, |x| x + 1e-3));
+        let found = failures(changed.path());
+        assert!(found.iter().any(|failure| failure == claim), "{claim}: {found:?}");
+    }
+
+    // A column of a table under another name.
+    let column = change("topology.tsv", true, &|text| text.replacen("reason", "cause", 1));
+    assert_eq!(failures(column.path()), ["topology.tsv: columns"]);
 
     // A cell of a table; a layout of another method; a setting.
     let cell = change("compare.tsv", true, &|text| text.replacen("\nradial\t0", "\nradial\t2", 1));

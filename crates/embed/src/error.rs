@@ -9,7 +9,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum Error {
     /// A parameter outside its range.
-    #[error("embed: {0}")]
+    #[error(transparent)]
     Param(#[from] ParamError),
     /// The views were made for another tree, by its digest.
     #[error("the views were made for another tree")]
@@ -87,6 +87,21 @@ pub enum Error {
         /// of crossings.
         can_move: bool,
     },
+    /// An edit that lays a branch back onto the edge that it comes from.
+    #[error(
+        "edits[{edit}] leaves {gap_deg:.2e}° between branch {branch} and the edge that it comes from; \
+         the least is {least_deg}°"
+    )]
+    Fold {
+        /// The edit, from 0.
+        edit: usize,
+        /// Its branch.
+        branch: usize,
+        /// The angle left, in degrees.
+        gap_deg: f64,
+        /// The least angle, in degrees.
+        least_deg: f64,
+    },
     /// Edits for another tree, by its digest.
     #[error("the edits were made for another tree")]
     EditsOfOtherTree,
@@ -110,6 +125,7 @@ impl Diagnose for Error {
             Self::Memory { .. } => "E-EMBED-MEMORY",
             Self::Uncertified { .. } => "E-EMBED-UNCERTIFIED",
             Self::Edits { .. } => "E-EMBED-EDITS",
+            Self::Fold { .. } => "E-EMBED-EDIT-FOLD",
             Self::EditsOfOtherTree => "E-EMBED-EDITS-TREE",
             Self::Worse { .. } => "E-EMBED-WORSE",
         }
@@ -118,9 +134,11 @@ impl Diagnose for Error {
     fn class(&self) -> Class {
         match self {
             Self::Param(error) => error.class(),
-            Self::OtherTree | Self::Views { .. } | Self::Scale { .. } | Self::EditsOfOtherTree => {
-                Class::Input
-            }
+            Self::OtherTree
+            | Self::Views { .. }
+            | Self::Scale { .. }
+            | Self::Fold { .. }
+            | Self::EditsOfOtherTree => Class::Input,
             Self::Memory { .. } => Class::Limit,
             Self::Uncertified { .. } | Self::Edits { .. } => Class::Uncertified,
             Self::Worse { .. } => Class::Internal,
@@ -139,6 +157,7 @@ impl Diagnose for Error {
                 "turn these branches less, or raise solver.effort for a longer search".to_owned()
             }
             Self::Edits { .. } => "turn one of these branches by another angle".to_owned(),
+            Self::Fold { .. } => "turn the branch a little less, or a little more".to_owned(),
             Self::EditsOfOtherTree => {
                 "make them anew: numbers of branches and nodes are of one tree only".to_owned()
             }

@@ -15,6 +15,8 @@
 //! Following the manual adjustment, our method checks to remove any newly introduced intersections."
 //! **Cost** a repair for each edit.
 
+use std::f64::consts::PI;
+
 use espalier_geom::angle::wrap;
 use espalier_model::{Certificate, Edit, EditRecord, Termination};
 use glam::DVec2;
@@ -27,6 +29,10 @@ use crate::pins::{self, Drawn, Pins};
 use crate::pose::Posed;
 use crate::problem::Problem;
 use crate::solver;
+
+/// A pinned branch keeps at least this from the edge that it comes from: a fold within the rounding of coordinates
+/// would be certified or not by chance, and nobody could see it.
+const LEAST_GAP_DEG: f64 = 0.01;
 
 /// The layout to be edited.
 pub(crate) struct Base<'a> {
@@ -95,6 +101,9 @@ pub(crate) fn replay(
     if !state.certificate.holds() {
         return Err(conflict(problem, edits, &state.certificate));
     }
+    for (edit_idx, edit) in edits.iter().enumerate() {
+        state.check_fold(edit_idx, edit)?;
+    }
     Ok(Replayed { positions: state.positions, turn_rad: state.drawn.turn_rad, records, work, termination })
 }
 
@@ -145,6 +154,18 @@ impl<'a> State<'a> {
         *turn_rad = wrap(*turn_rad + edit.angle_deg.to_radians());
         self.pins.angle[joint..self.problem.branches.list()[edit.branch].nodes.end].fill(true);
         self.pins.length[edit.branch] = true;
+    }
+
+    /// Refuses a pinned fold that the picture could not show: nothing could open it again.
+    fn check_fold(&self, edit_idx: usize, edit: &Edit) -> Result<(), Error> {
+        let joint = joint(self.problem, edit);
+        let gap_rad = PI - self.drawn.turn_rad[joint].abs();
+        // The root's children come from nowhere.
+        if self.problem.parent[joint] == 0 || gap_rad >= LEAST_GAP_DEG.to_radians() {
+            return Ok(());
+        }
+        let (edit, branch) = (edit_idx, edit.branch);
+        Err(Error::Fold { edit, branch, gap_deg: gap_rad.to_degrees(), least_deg: LEAST_GAP_DEG })
     }
 
     fn shape(&self) -> (solver::Shape, Problem<'a>) {

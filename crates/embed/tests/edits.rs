@@ -238,6 +238,35 @@ fn what_cannot_be_is_refused_by_name() {
 }
 
 #[test]
+fn a_fold_that_nobody_could_see_is_refused() {
+    // The last edge is shorter than the one before it: folded back it meets nothing else.
+    let tree = tree_of(&[
+        (0.0, 0.0, 0.0, None),
+        (0.0, 10.0, 0.0, Some(0)),
+        (-3.0, 18.0, 0.0, Some(1)),
+        (3.0, 18.0, 0.0, Some(1)),
+        (7.0, 26.0, 0.0, Some(3)),
+        (9.0, 29.0, 0.0, Some(4)),
+    ]);
+    let before = base(&tree);
+    let straight = 180.0 - turn_rad(&tree, &before, 5).to_degrees();
+    let refused = |short_of_it_deg: f64| {
+        let edit = Edit { branch: 2, node: 4, angle_deg: wrap_deg(straight - short_of_it_deg) };
+        edited(&tree, &[edit]).err()
+    };
+    // Exactly back onto itself the edges meet; within rounding of that they would not.
+    assert!(refused(0.0).is_some());
+    let fold = refused(1e-3).expect("a fold");
+    assert!(matches!(fold, Error::Fold { edit: 0, branch: 2, .. }), "{fold}");
+    assert_eq!((fold.code(), fold.class()), ("E-EMBED-EDIT-FOLD", Class::Input));
+    assert!(!matches!(refused(0.5), Some(Error::Fold { .. })));
+}
+
+fn wrap_deg(angle_deg: f64) -> f64 {
+    wrap(angle_deg.to_radians()).to_degrees()
+}
+
+#[test]
 fn trees_with_little_to_edit() {
     let edge = tree_of(&[(0.0, 0.0, 0.0, None), (1.0, 2.0, 3.0, Some(0))]);
     let edit = Edit { branch: 0, node: 0, angle_deg: 90.0 };

@@ -168,7 +168,7 @@ fn a_rule_for_a_part_that_is_not_there() {
         embed(&tree, &views_along(&tree, DVec3::Z), &params, 0, &|_| {}).expect_err("refused")
     };
     let error = refused(WeightRule { nodes: Some(vec![30]), ..rule() });
-    assert_eq!(error.to_string(), "embed: weights[0].nodes: there is no 30: they are 1 to 29");
+    assert_eq!(error.to_string(), "weights[0].nodes: there is no 30: they are 1 to 29");
     assert_eq!(error.class(), Class::Usage);
     assert!(
         refused(WeightRule { branches: Some(vec![999]), ..rule() })

@@ -112,6 +112,19 @@ impl RunFolder {
         file.commit().map_err(write)
     }
 
+    /// Checks every file that `SHA256SUMS` names against its digest.
+    pub(crate) fn check_all(&self) -> Result<(), Error> {
+        for (relative, expected) in &self.digests {
+            let path = self.path.join(relative);
+            let (_, found) =
+                file_digest(&path).map_err(|source| Error::Read { path: path.clone(), source })?;
+            if found != *expected {
+                return Err(Error::Altered { path });
+            }
+        }
+        Ok(())
+    }
+
     /// The bytes of a result file, checked against its digest if the folder has one.
     pub(crate) fn read(&self, relative: &str) -> Result<Vec<u8>, Error> {
         let path = self.path.join(relative);

@@ -13,7 +13,7 @@ use espalier_model::diagnose::{Class, Diagnose};
 use espalier_model::{Comparison, Embedding, FileError, ViewHierarchy, swc};
 use espalier_verify::{
     Check, Claim, Outcome, Rule, Value, Weights, check_compare_table, check_comparison, check_embedding,
-    check_nodes_table,
+    check_header, check_nodes_table,
 };
 use serde::Serialize;
 use thiserror::Error as ThisError;
@@ -28,6 +28,7 @@ const SUMS: &str = "SHA256SUMS";
 const CONFIG: &str = "provenance/config.resolved.toml";
 const NODES: &str = "nodes.tsv";
 const COMPARE: &str = "compare.tsv";
+const DICTIONARY: &str = "dictionary.tsv";
 /// What the checks read beside those.
 const CHECKED: [Artifact; 4] = [Artifact::Tree, Artifact::Views, Artifact::Embedding, Artifact::Comparison];
 
@@ -144,7 +145,12 @@ pub fn verify(folder: &Path, threads: Option<usize>) -> Result<Verification, Err
         let folder = Folder(folder);
         let (mut checks, digest) = folder.check_digests()?;
         let is_altered = checks.iter().any(|(_, check)| check.fails());
-        match folder.check_contents() {
+        let tables: Vec<String> =
+            checks.iter().map(|(file, _)| file).filter(|file| is_table(file)).cloned().collect();
+        match folder.check_contents().and_then(|mut contents| {
+            contents.extend(folder.check_headers(&tables)?);
+            Ok(contents)
+        }) {
             Ok(contents) => checks.extend(contents),
             // What was altered since may well be unreadable; that it was altered is the finding.
             Err(Error::File { path, cause }) if is_altered => {
@@ -186,7 +192,9 @@ impl Folder<'_> {
             let (_, found) = file_digest(&path).map_err(|source| Error::Read { path, source })?;
             checks.push((file.to_owned(), Check::same("sha256", digest, found)));
         }
-        for file in CHECKED.map(|artifact| artifact.file()).into_iter().chain([NODES, COMPARE, CONFIG]) {
+        for file in
+            CHECKED.map(|artifact| artifact.file()).into_iter().chain([NODES, COMPARE, DICTIONARY, CONFIG])
+        {
             if !checks.iter().any(|(listed, _)| listed == file) {
                 let fault = Some("no line in SHA256SUMS".to_owned());
                 checks.push((file.to_owned(), Check::unless("sealed", "yes", fault)));
@@ -234,6 +242,17 @@ impl Folder<'_> {
         Ok(checks)
     }
 
+    /// The columns of each sealed table, and of the times beside them, against the dictionary.
+    fn check_headers(&self, tables: &[String]) -> Result<Vec<(String, Check)>, Error> {
+        let dictionary = self.text(DICTIONARY)?;
+        let check = |file: &String| {
+            let name = Path::new(file).file_name().and_then(|name| name.to_str()).unwrap_or(file);
+            let text = String::from_utf8_lossy(&self.bytes(file)?).into_owned();
+            Ok((file.clone(), check_header(&dictionary, &[file, name], &text)))
+        };
+        tables.iter().map(check).collect()
+    }
+
     fn config(&self) -> Result<Config, Error> {
         let text = self.text(CONFIG)?;
         Config::parse(&text, Path::new(CONFIG), &[])
@@ -257,6 +276,11 @@ impl Folder<'_> {
             Err(error) => Err(Error::file(&self.0.join(file), error)),
         }
     }
+}
+
+/// Whether a file is a table that the dictionary has to explain: not itself.
+fn is_table(file: &str) -> bool {
+    Path::new(file).extension().is_some_and(|extension| extension == "tsv") && file != DICTIONARY
 }
 
 /// A line of `SHA256SUMS`; no file outside of the folder is anyone's business.

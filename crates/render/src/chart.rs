@@ -153,8 +153,15 @@ impl Artist {
         marks.push(self.line(DVec2::new(low.x, low.y), DVec2::new(low.x, high.y), 0.1, self.colors.ink));
         marks.push(self.line(DVec2::new(low.x, high.y), high, 0.1, self.colors.ink));
         let every = charts.ticks.len().div_ceil(MOST_TICKS).max(1);
+        let mut free_from = f64::NEG_INFINITY;
         for (place, text) in charts.ticks.iter().step_by(every) {
             let x = x_of(*place);
+            // A label that would run into the one before it is left out, and its tick with it.
+            let half_px = 0.5 * f64::from(self.face.width(text, (SMALL * self.unit) as f32));
+            if x - half_px < free_from {
+                continue;
+            }
+            free_from = x + half_px + 0.5 * self.unit;
             let tick = DVec2::new(0.0, 0.5 * self.unit);
             let foot = DVec2::new(x, high.y);
             marks.push(self.line(foot, foot + tick, 0.1, self.colors.ink));

@@ -7,7 +7,7 @@
 //! **Cost** O(N log N), and 1.1 million distances.
 
 use espalier_model::{
-    Branches, Embedding, Energy, LossColumn, Losses, MethodRow, Termination, Tree, ViewHierarchy, WidthMode,
+    Embedding, Energy, LossColumn, Losses, MethodRow, Termination, Tree, ViewHierarchy, WidthMode,
 };
 use glam::DVec2;
 
@@ -18,7 +18,7 @@ use crate::losses::{Loss, losses};
 use crate::overlaps::Overlaps;
 use crate::sweep::{Meetings, meetings};
 use crate::weights::{NodeWeights, Weights};
-use crate::{overlaps, ratios, targets};
+use crate::{overlaps, pose, ratios, targets, widths};
 
 /// Share by which a sum of many doubles may differ from the same sum in another order.
 const ROUNDING: f64 = 1e-9;
@@ -87,7 +87,11 @@ pub fn check_embedding(claim: &Claim<'_>) -> Vec<Check> {
         &embedding.losses,
         &losses((tree, &branches), &embedding.targets, (&flat, &positions)),
     ));
-    checks.extend(check_rows(claim, &branches));
+    checks.extend(pose::check_pose(tree, embedding));
+    checks.push(pose::check_trace(embedding));
+    let overlaps = overlaps::count(tree, &branches, &embedding.positions_mm);
+    checks.extend(widths::check((tree, &branches), embedding, &overlaps));
+    checks.extend(check_rows(claim, &overlaps));
     checks
 }
 
@@ -166,8 +170,8 @@ fn check_losses(stated: &Losses, found: &[Loss]) -> Vec<Check> {
 }
 
 /// Checks what is said about all methods together.
-fn check_rows(claim: &Claim<'_>, branches: &Branches) -> Vec<Check> {
-    let Claim { tree, embedding, weights, .. } = *claim;
+fn check_rows(claim: &Claim<'_>, overlaps: &Overlaps) -> Vec<Check> {
+    let Claim { embedding, weights, .. } = *claim;
     // A method may have run twice, the second time against other targets.
     let is_own = |row: &&MethodRow| row.method == embedding.method && row.targets == embedding.targets.kind;
     let Some(own) = embedding.methods.iter().find(is_own) else {
@@ -180,7 +184,7 @@ fn check_rows(claim: &Claim<'_>, branches: &Branches) -> Vec<Check> {
     let fault = (!is_same).then(|| format!("the row of {} says something else", own.method));
     vec![
         Check::unless("row of the result", own.method.as_str(), fault),
-        check_overlaps(own, overlaps::count(tree, branches, &embedding.positions_mm)),
+        check_overlaps(own, overlaps),
         check_crossing_weight(&embedding.methods, weights.crossing),
         check_best(claim, own),
         check_optimal(embedding),
@@ -190,8 +194,8 @@ fn check_rows(claim: &Claim<'_>, branches: &Branches) -> Vec<Check> {
     .collect()
 }
 
-fn check_overlaps(own: &MethodRow, found: Overlaps) -> Check {
-    let Overlaps { certain, open, is_complete } = found;
+fn check_overlaps(own: &MethodRow, found: &Overlaps) -> Check {
+    let Overlaps { certain, open, is_complete, .. } = *found;
     if !is_complete {
         return Check::untested("overlaps", own.overlaps, "too many tubes overlap to count them");
     }
@@ -221,14 +225,15 @@ fn check_crossing_weight(rows: &[MethodRow], stated: Option<f64>) -> Check {
     Check::unless("price of crossings", price, fault)
 }
 
-/// No certified layout with the same targets has a lower energy; of an edited layout, than the one it was made of.
+/// No certified layout with the same targets has a lower energy; of an edited layout or one that gave way to widths,
+/// than the one it was made of.
 fn check_best(claim: &Claim<'_>, own: &MethodRow) -> Check {
     let rows = &claim.embedding.methods;
-    let unedited = own.method.strip_suffix(EDITED).filter(|_| !claim.embedding.edits.is_empty());
-    let best = unedited.map_or(Some(own), |name| rows.iter().find(|row| row.method == name));
     let name = "never worse";
+    let origin = origin(claim.embedding, own);
+    let best = if origin == own.method { Some(own) } else { rows.iter().find(|row| row.method == origin) };
     let Some(best) = best else {
-        return Check::unless(name, own.method.as_str(), Some("what was edited is no row".to_owned()));
+        return Check::unless(name, own.method.as_str(), Some(format!("{origin} is no row")));
     };
     let energy = best.energy.total();
     let rivals = rows.iter().filter(|row| row.crossings == 0 && row.targets == best.targets);
@@ -236,13 +241,25 @@ fn check_best(claim: &Claim<'_>, own: &MethodRow) -> Check {
     let better = rivals.min_by(|a, b| a.energy.total().total_cmp(&b.energy.total()));
     let better = better.filter(|row| row.energy.total() + EQUAL * energy.max(1.0) < energy);
     let fault = better.map(|row| format!("{} has {:.9}", row.method, row.energy.total()));
-    if claim.embedding.widths.mode != WidthMode::Report {
-        Check::untested(name, own.method.as_str(), "branches may give way to widths")
-    } else if claim.must_be_best {
-        Check::unless(name, format!("{energy:.9} is the least energy"), fault)
+    if claim.must_be_best {
+        Check::unless(name, format!("{energy:.9} of {origin} is the least energy"), fault)
     } else {
         Check::untested(name, own.method.as_str(), "the method was asked for by name")
     }
+}
+
+/// The method whose layout was edited or gave way to widths; the row's own where nothing was done to it.
+fn origin<'a>(embedding: &Embedding, own: &'a MethodRow) -> &'a str {
+    let mut origin = own.method.as_str();
+    if !embedding.edits.is_empty() {
+        origin = origin.strip_suffix(EDITED).unwrap_or(origin);
+    }
+    let suffix = match embedding.widths.mode {
+        WidthMode::Report => return origin,
+        WidthMode::Avoid => "-avoid",
+        WidthMode::Stretch => "-stretch",
+    };
+    origin.strip_suffix(suffix).unwrap_or(origin)
 }
 
 /// The edits begin with a layout of the table and end with the embedding, and keep what they ask for.

@@ -1,7 +1,7 @@
 //! How many pairs of drawn tubes overlap.
 //!
-//! **Input** the tree with radii, positions. **Output** `Overlaps`: pairs that do, and pairs that rounding may put on
-//! either side. **Definition** as documented for the column `overlaps`: an edge is a capsule of its mean radius; two
+//! **Input** the tree with radii, positions. **Output** `Overlaps`: pairs that do, pairs that rounding may put on
+//! either side, and the scale of radii at which none does. **Definition** as documented for the column `overlaps`: an edge is a capsule of its mean radius; two
 //! edges without a common node overlap if their capsules do and if the path along the tree between their near ends is
 //! longer than r_e + r_f and than twice the junction disc of the node at which they part. The disc of tubes r_i, r_j at
 //! the gap g has the radius √(r_i² + r_j² + 2 r_i r_j cos g) / sin g for g ≤ 90°, r_i + r_j above, and no more than the
@@ -23,7 +23,7 @@ const MOST_PAIRS: usize = 20_000_000;
 const OPEN: f64 = 1e-9;
 
 /// What was found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Overlaps {
     /// Pairs that overlap beyond doubt.
     pub(crate) certain: usize,
@@ -31,13 +31,16 @@ pub(crate) struct Overlaps {
     pub(crate) open: usize,
     /// Whether all pairs were looked at.
     pub(crate) is_complete: bool,
+    /// The least distance over the sum of radii, at most 1: of the pairs that overlap and of the open ones, and of
+    /// the former alone.
+    pub(crate) scale: [f64; 2],
 }
 
 /// Counts the overlapping pairs.
 pub(crate) fn count(tree: &Tree, branches: &Branches, positions: &[DVec2]) -> Overlaps {
     let tubes = Tubes::new(tree, branches, positions);
     let mut boxes = Boxes::new(tree.n_nodes(), |edge| tubes.bounds(edge));
-    let (mut found, mut n_pairs) = (Overlaps { is_complete: true, ..Overlaps::default() }, 0);
+    let (mut found, mut n_pairs) = (Overlaps { certain: 0, open: 0, is_complete: true, scale: [1.0; 2] }, 0);
     let mut later = Vec::new();
     for edge in 1..tree.n_nodes() {
         boxes.later_meeting(edge, &tubes.bounds(edge), &mut later);
@@ -47,10 +50,17 @@ pub(crate) fn count(tree: &Tree, branches: &Branches, positions: &[DVec2]) -> Ov
             return found;
         }
         for &other in &later {
-            match tubes.overlap(edge, other) {
-                Some(true) => found.certain += 1,
-                Some(false) => {}
-                None => found.open += 1,
+            let verdict = tubes.overlap(edge, other);
+            if verdict == Some(false) {
+                continue;
+            }
+            let scale = tubes.distance(edge, other) / tubes.reach(edge, other);
+            found.scale[0] = found.scale[0].min(scale);
+            if verdict == Some(true) {
+                found.certain += 1;
+                found.scale[1] = found.scale[1].min(scale);
+            } else {
+                found.open += 1;
             }
         }
     }
@@ -87,13 +97,23 @@ impl<'a> Tubes<'a> {
         Box2::around(a, b, self.radius[node])
     }
 
+    /// The distance between the centrelines of two edges.
+    fn distance(&self, a: usize, b: usize) -> f64 {
+        segment_distance(&self.segment(a), &self.segment(b))
+    }
+
+    /// The sum of their radii.
+    fn reach(&self, a: usize, b: usize) -> f64 {
+        self.radius[a] + self.radius[b]
+    }
+
     /// Whether edges a < b overlap; `None` if rounding decides.
     fn overlap(&self, a: usize, b: usize) -> Option<bool> {
         if self.kinship.are_neighbours(a, b) {
             return Some(false);
         }
-        let reach = self.radius[a] + self.radius[b];
-        let is_near = is_less(segment_distance(&self.segment(a), &self.segment(b)), reach);
+        let reach = self.reach(a, b);
+        let is_near = is_less(self.distance(a, b), reach);
         if is_near == Some(false) {
             return Some(false);
         }

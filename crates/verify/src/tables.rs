@@ -75,6 +75,33 @@ fn last_digit(text: &str) -> f64 {
     format!("1e{exponent}").parse().unwrap_or(0.0)
 }
 
+/// Checks the first line of a table against what a data dictionary lists for it, in that order.
+///
+/// `dictionary` is the text of `dictionary.tsv`; `names` are those under which it may list the table.
+#[must_use]
+pub fn check_header(dictionary: &str, names: &[&str], table: &str) -> Check {
+    let header: Vec<&str> = table.lines().next().unwrap_or_default().split('\t').collect();
+    let listed: Vec<&str> = dictionary
+        .lines()
+        .skip(1)
+        .filter_map(|line| {
+            let mut cells = line.split('\t');
+            names.contains(&cells.next()?).then(|| cells.next()).flatten()
+        })
+        .collect();
+    let stated = format!("{} columns", header.len());
+    if listed.is_empty() {
+        return Check::untested("columns", stated, "the dictionary does not list this table");
+    }
+    let stray = header.iter().zip(&listed).find(|(own, listed)| own != listed);
+    let fault = match stray {
+        Some((own, listed)) => Some(format!("{own}, which dictionary.tsv calls {listed}")),
+        None if header.len() != listed.len() => Some(format!("dictionary.tsv lists {}", listed.len())),
+        None => None,
+    };
+    Check::unless("columns", stated, fault)
+}
+
 /// Checks `nodes.tsv`.
 #[must_use]
 pub fn check_nodes_table(text: &str, tree: &Tree, embedding: &Embedding) -> Check {

@@ -5,7 +5,7 @@
 mod common;
 
 use espalier_embed::{Method, Params, PsoParams, TargetMode, WeightRule, embed};
-use espalier_model::{Embedding, Termination, Tree, ViewHierarchy};
+use espalier_model::{Embedding, Termination, TracePoint, Tree, ViewHierarchy};
 use espalier_verify::{
     Claim, Outcome, Rule, Weights, check_compare_table, check_embedding, check_nodes_table,
 };
@@ -110,7 +110,7 @@ fn each_change_is_found_where_it_is() {
     let tree = common::random_tree(0, 60, 0.5, false, 3);
     let (views, embedding) = made(&tree, &quick());
     type Change = fn(&mut Embedding);
-    let changes: [(&str, Change); 17] = [
+    let changes: [(&str, Change); 24] = [
         ("tree", |e| e.tree.replace_range(..1, "x")),
         ("coordinates", |e| e.positions_mm[7].x += 0.3 * e.quantum_mm),
         ("range of exact arithmetic", |e| {
@@ -135,6 +135,17 @@ fn each_change_is_found_where_it_is() {
             let other = e.methods.iter_mut().find(|row| row.method != own && row.crossings == 0);
             other.expect("another method").energy = espalier_model::Energy::default();
         }),
+        // Turned by a right angle, and the other side of the sheet.
+        ("pose", |e| e.positions_mm.iter_mut().for_each(|p| *p = p.perp())),
+        ("pose: side", |e| e.positions_mm.iter_mut().for_each(|p| p.x = -p.x)),
+        ("pose: root", |e| e.positions_mm.iter_mut().for_each(|p| p.x += 1.0)),
+        ("trace", |e| {
+            let point = |iteration, energy| TracePoint { iteration, evaluations: 1, energy, crossings: 0 };
+            e.trace = vec![point(0, 1.0), point(1, 2.0)];
+        }),
+        ("widths: overlaps", |e| e.widths.overlaps += 1),
+        ("widths: radius scale", |e| e.widths.radius_scale *= 0.999),
+        ("widths: length scale", |e| e.widths.length_scale = 1.5),
         ("termination", |e| {
             e.termination = Termination::Optimal;
             e.angle_ratio[20] += 0.1;

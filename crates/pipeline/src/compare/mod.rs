@@ -152,6 +152,7 @@ fn read_run(request: &CompareRequest, path: &Path, name: String) -> Result<Found
         }
     }
     let folder = RunFolder::to_read(path);
+    folder.check_all()?;
     let mut artifacts = Artifacts {
         read_options: espalier_volume::ReadOptions {
             max_bytes: request.max_memory_bytes,
