@@ -194,3 +194,34 @@ fn offset(bit: usize, strides: [isize; 3]) -> isize {
     let digits = [bit % 3, bit / 3 % 3, bit / 9];
     (0..3).map(|axis| (digits[axis] as isize - 1) * strides[axis]).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use espalier_geom::random::{Purpose, Stream};
+    use espalier_model::Grid;
+    use glam::DVec3;
+
+    use super::*;
+
+    #[test]
+    fn neighborhoods_are_the_voxels_about_a_cell_across_words_too() {
+        let mut stream = Stream::new(3, Purpose::Test, 0, 0);
+        let grid = Grid::axis_aligned([140, 5, 4], DVec3::ONE, DVec3::ZERO).expect("grid");
+        let noise: Vec<bool> = (0..grid.n_voxels()).map(|_| stream.below(2) == 0).collect();
+        let mask = Mask::from_voxels(grid, &noise);
+        let lattice = Lattice::from_mask(&mask, Orientation::Stored).expect("not empty");
+        let (low, _) = mask.bounding_box().expect("not empty");
+        for cell in lattice.foreground() {
+            let voxel = lattice.coordinates(cell);
+            let expected = (0..27).fold(0, |bits, bit| {
+                let d = [bit % 3, bit / 3 % 3, bit / 9];
+                let at = [0, 1, 2].map(|axis| (voxel[axis] + d[axis] + low[axis]) as i64 - 2);
+                bits | u32::from(mask.contains(at)) << bit
+            });
+            assert_eq!(lattice.neighborhood(cell), expected, "{voxel:?}");
+            let neighbors: Vec<usize> = lattice.neighbors(cell).collect();
+            let around = lattice.surroundings(cell).filter(|&other| lattice.is_foreground(other));
+            assert_eq!(neighbors, around.collect::<Vec<_>>(), "{voxel:?}");
+        }
+    }
+}

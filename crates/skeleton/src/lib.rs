@@ -3,11 +3,12 @@
 //! | step | file | what |
 //! |--:|---|---|
 //! | 1 | `lattice` | crop the mask to its foreground, turn its axes to RAS, pad it with background |
-//! | 2 | `euler`, `simple` | what a voxel's 26 neighbours say: end point, Euler invariance, simplicity |
-//! | 3 | `depth` | how deep each voxel lies, in mm: the order of peeling (`safe`) |
-//! | 4 | `thinning` | peel border voxels from six sides until nothing changes |
-//! | 5 | `tips` | give tips back what the sub-iterations took too much (`safe`) |
-//! | 6 | `topology` | components and Euler number before and after, for the report |
+//! | 2 | `topology` | components and Euler number, before and after, for the report |
+//! | 3 | `euler`, `simple` | what a voxel's 26 neighbours say: end point, Euler invariance, simplicity |
+//! | 4 | `open` | the voxels that may have become deletable |
+//! | 5 | `thinning` | peel border voxels from six sides until nothing changes (`lee94`) |
+//! | 6 | `depth`, `safe` | the same, level by level of depth in mm, with tips that hold (`safe`) |
+//! | 7 | `tips` | move tips to where they belong (`safe`) |
 //!
 //! Connectivity is 26 for the foreground and 6 for the background throughout.
 //!
@@ -29,6 +30,7 @@ mod depth;
 mod euler;
 mod lattice;
 mod open;
+mod safe;
 mod simple;
 mod thinning;
 mod tips;

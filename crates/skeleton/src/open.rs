@@ -1,22 +1,14 @@
 //! The work list of thinning: which voxels may have become deletable.
 //!
 //! **Notation** a voxel is *open* if its neighbourhood changed since the predicate last refused it. The predicate
-//! depends on the 26 neighbours alone, so it need not be asked of any other voxel. A word is *active* if it may hold
-//! an open voxel.
+//! depends on the voxels near by alone, so it need not be asked of any other voxel. A word is *active* if it may hold
+//! an open voxel. A voxel is *held* if it must not be asked about before it is released.
 //! **Guarantees** every open border voxel is in the list; voxels beside these may be.
-//! **Cost** one bit a voxel of the box; per sub-iteration O(active words).
+//! **Cost** two bits a voxel of the box; per sub-iteration O(active words).
 
 use crate::lattice::{Lattice, WORD, ones};
 
-/// The voxels at work.
-pub(crate) struct Open {
-    /// One bit a cell.
-    bits: Vec<u64>,
-    /// One bit a word of `bits`.
-    active: Vec<u64>,
-}
-
-/// One of the six ways out of a voxel, as the step in words; the steps along x are within a word.
+/// One of the six ways out of a voxel: along x within a word, else as a step in words.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Direction {
     Left,
@@ -24,34 +16,70 @@ pub(crate) enum Direction {
     Words(isize),
 }
 
+impl Direction {
+    /// All six, in the published order: −y, +y, +x, −x, +z, −z.
+    pub(crate) fn all(lattice: &Lattice) -> [Self; 6] {
+        let [row, slab] = lattice.word_strides().map(|stride| stride as isize);
+        [Self::Words(-row), Self::Words(row), Self::Right, Self::Left, Self::Words(slab), Self::Words(-slab)]
+    }
+
+    /// The neighbours on this side of the cells of a word.
+    fn neighbors(self, words: &[u64], word: usize) -> u64 {
+        match self {
+            // Rows begin and end with padding, so nothing is carried from one to the next.
+            Self::Left => words[word] << 1 | word.checked_sub(1).map_or(0, |last| words[last] >> (WORD - 1)),
+            Self::Right => words[word] >> 1 | words.get(word + 1).map_or(0, |next| next << (WORD - 1)),
+            Self::Words(step) => words[word.wrapping_add_signed(step)],
+        }
+    }
+}
+
+/// What is said of a voxel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Answer {
+    /// It may go, with this neighbourhood; it is asked about again.
+    Goes(u32),
+    /// It stays until its neighbourhood changes.
+    Stays,
+    /// It stays until it is released.
+    Waits,
+}
+
+/// The voxels at work.
+pub(crate) struct Open {
+    /// One bit a cell.
+    bits: Vec<u64>,
+    /// One bit a word of `bits`.
+    active: Vec<u64>,
+    /// One bit a cell.
+    held: Vec<u64>,
+    directions: [Direction; 6],
+}
+
 impl Open {
     /// All border voxels are open.
     pub(crate) fn border(lattice: &Lattice) -> Self {
-        let n_words = lattice.bits().words().len();
-        let mut open = Self { bits: vec![0; n_words], active: vec![0; n_words.div_ceil(WORD)] };
-        let [row, slab] = lattice.word_strides().map(|stride| stride as isize);
-        for (word, &foreground) in lattice.bits().words().iter().enumerate() {
-            if foreground == 0 {
-                continue;
-            }
-            let mut inner = foreground;
-            for direction in [
-                Direction::Left,
-                Direction::Right,
-                Direction::Words(row),
-                Direction::Words(-row),
-                Direction::Words(slab),
-                Direction::Words(-slab),
-            ] {
-                inner &= shifted(lattice, word, direction);
-            }
-            open.open(word, foreground & !inner);
+        let words = lattice.bits().words();
+        let n_blocks = words.len().div_ceil(WORD);
+        let mut open = Self {
+            bits: vec![0; words.len()],
+            active: vec![0; n_blocks],
+            held: vec![0; words.len()],
+            directions: Direction::all(lattice),
+        };
+        for (word, &foreground) in words.iter().enumerate().filter(|&(_, &bits)| bits != 0) {
+            open.add(word, foreground & open.border_of(words, word));
         }
         open
     }
 
+    /// The cells of a word that have background on one of their six sides.
+    fn border_of(&self, words: &[u64], word: usize) -> u64 {
+        !self.directions.iter().fold(u64::MAX, |inner, side| inner & side.neighbors(words, word))
+    }
+
     /// Opens bits of a word.
-    pub(crate) fn open(&mut self, word: usize, bits: u64) {
+    pub(crate) fn add(&mut self, word: usize, bits: u64) {
         if bits & !self.bits[word] != 0 {
             self.bits[word] |= bits;
             self.active[word / WORD] |= 1 << (word % WORD);
@@ -59,57 +87,52 @@ impl Open {
     }
 
     /// Opens the foreground about a cell.
-    pub(crate) fn open_around(&mut self, lattice: &Lattice, cell: usize) {
+    pub(crate) fn add_around(&mut self, lattice: &Lattice, cell: usize) {
         let words = lattice.bits().words();
         let [row, slab] = lattice.word_strides();
         let (first, bit) = ((cell - 1) / WORD - slab - row, (cell - 1) % WORD);
         for line in 0..9 {
             let word = first + line / 3 * slab + line % 3 * row;
-            self.open(word, 7 << bit & words[word]);
+            self.add(word, 7 << bit & words[word]);
             if bit > WORD - 3 {
-                self.open(word + 1, 7 >> (WORD - bit) & words[word + 1]);
+                self.add(word + 1, 7 >> (WORD - bit) & words[word + 1]);
             }
         }
     }
 
-    /// Goes through the open voxels that are border for `direction`, in raster order, and keeps those open that
-    /// `qualifies` says yes to; `collected` gets them as words and bits.
-    pub(crate) fn collect(
+    /// Opens a held cell.
+    pub(crate) fn release(&mut self, cell: usize) {
+        self.held[cell / WORD] &= !(1 << (cell % WORD));
+        self.add(cell / WORD, 1 << (cell % WORD));
+    }
+
+    /// Asks about each open voxel with background in `direction`, in raster order.
+    pub(crate) fn ask(
         &mut self,
         lattice: &Lattice,
         direction: Direction,
-        mut qualifies: impl FnMut(usize) -> bool,
-        collected: &mut Vec<(usize, u64)>,
+        mut answer: impl FnMut(usize) -> Answer,
     ) {
-        collected.clear();
+        let words = lattice.bits().words();
         for block in 0..self.active.len() {
             for bit in ones(self.active[block]) {
                 let word = block * WORD + bit;
-                self.bits[word] &= lattice.bits().words()[word];
-                if self.bits[word] == 0 {
-                    self.active[block] &= !(1 << bit);
-                    continue;
+                let mut open = self.bits[word] & words[word] & !self.held[word];
+                let candidates = open & !direction.neighbors(words, word);
+                if candidates == 0 {
+                    // What lies inside opens again when a side is laid bare.
+                    open &= self.border_of(words, word);
                 }
-                let candidates = self.bits[word] & !shifted(lattice, word, direction);
-                let found = ones(candidates)
-                    .filter(|bit| qualifies(word * WORD + bit))
-                    .fold(0, |found, bit| found | 1 << bit);
-                self.bits[word] &= !(candidates & !found);
-                if found != 0 {
-                    collected.push((word, found));
+                for bit in ones(candidates) {
+                    let answer = answer(word * WORD + bit);
+                    open &= !(u64::from(!matches!(answer, Answer::Goes(_))) << bit);
+                    self.held[word] |= u64::from(answer == Answer::Waits) << bit;
+                }
+                self.bits[word] = open;
+                if open == 0 {
+                    self.active[block] &= !(1 << bit);
                 }
             }
         }
-    }
-}
-
-/// The neighbours in `direction` of the cells of a word.
-fn shifted(lattice: &Lattice, word: usize, direction: Direction) -> u64 {
-    let words = lattice.bits().words();
-    match direction {
-        // Rows begin and end with padding, so nothing is carried from one to the next.
-        Direction::Left => words[word] << 1 | word.checked_sub(1).map_or(0, |last| words[last] >> (WORD - 1)),
-        Direction::Right => words[word] >> 1 | words.get(word + 1).map_or(0, |next| next << (WORD - 1)),
-        Direction::Words(step) => words[word.wrapping_add_signed(step)],
     }
 }

@@ -17,6 +17,8 @@ const X_LOW: u32 = 0o111_111_111;
 const X_HIGH: u32 = X_LOW << 2;
 const Y_LOW: u32 = 0o007_007_007;
 const Y_HIGH: u32 = Y_LOW << 6;
+const Z_LOW: u32 = 0o777;
+const Z_HIGH: u32 = Z_LOW << 18;
 
 /// The number of foreground neighbours.
 pub(crate) fn n_neighbors(neighborhood: u32) -> u32 {
@@ -26,6 +28,13 @@ pub(crate) fn n_neighbors(neighborhood: u32) -> u32 {
 /// Whether the voxel is the end of a curve: it has exactly one neighbour.
 pub(crate) fn is_endpoint(neighborhood: u32) -> bool {
     n_neighbors(neighborhood) == 1
+}
+
+/// Whether all neighbours lie in one 2×2×2 block with the voxel.
+pub(crate) fn is_corner(neighborhood: u32) -> bool {
+    [(X_LOW, X_HIGH), (Y_LOW, Y_HIGH), (Z_LOW, Z_HIGH)]
+        .iter()
+        .all(|(low, high)| neighborhood & low == 0 || neighborhood & high == 0)
 }
 
 /// Whether the neighbours form at most one 26-connected component.
@@ -71,6 +80,17 @@ mod tests {
             }
         }
         n_components
+    }
+
+    #[test]
+    fn a_corner_has_its_neighbors_on_one_side_of_each_axis() {
+        let bit = |d: [i32; 3]| 1_u32 << (13 + d[0] + 3 * d[1] + 9 * d[2]);
+        assert!(is_corner(CENTER) && is_corner(bit([1, 0, 0]) | bit([1, -1, 1]) | bit([0, -1, 0])));
+        for axis in 0..3 {
+            let (mut low, mut high) = ([0; 3], [1; 3]);
+            (low[axis], high[axis]) = (-1, 1);
+            assert!(!is_corner(bit(low) | bit(high)), "axis {axis}");
+        }
     }
 
     #[test]

@@ -8,7 +8,6 @@
 
 mod common;
 
-use espalier_model::Mask;
 use espalier_skeleton::{Orientation, Params, Thinning, skeletonize};
 use sha2::{Digest as _, Sha256};
 
@@ -44,35 +43,16 @@ fn lee94_is_the_reference_bit_for_bit() {
     }
 }
 
-/// Small volumes and what scikit-image 0.26 leaves of them; the format stands in `scripts/lee94-fixture`.
-const FIXTURE: &str = include_str!("../../../fixtures/lee94.tsv");
-
-/// Voxels from hex digits, four to a digit, the first voxel the highest bit.
-fn unpacked(hex: &str, n_voxels: usize) -> Vec<bool> {
-    let bits = hex.chars().flat_map(|digit| {
-        let four = digit.to_digit(16).expect("a hex digit");
-        (0..4).rev().map(move |bit| four >> bit & 1 == 1)
-    });
-    let mut voxels: Vec<bool> = bits.collect();
-    assert!(voxels.len() >= n_voxels && voxels.split_off(n_voxels).iter().all(|&filler| !filler));
-    voxels
-}
-
 #[test]
-fn lee94_is_scikit_image_on_small_volumes() {
+fn lee94_is_scikit_image_on_400_small_volumes() {
     let params = Params { thinning: Thinning::Lee94, orientation: Orientation::Stored };
     let (mut n_cases, mut n_voxels) = (0, 0);
-    for line in FIXTURE.lines().skip(1) {
-        let [name, nx, ny, nz, volume, skeleton] = line.split('\t').collect::<Vec<_>>()[..] else {
-            panic!("not six fields: {line}")
-        };
-        let shape = [nx, ny, nz].map(|extent| extent.parse().expect("an extent"));
-        let volume = unpacked(volume, shape.iter().product());
-        let mask = Mask::from_voxels(common::grid(shape), &volume);
-        let expected = unpacked(skeleton, volume.len());
-        assert!(common::skeleton_mask(&mask, &params).to_voxels() == expected, "{name} {shape:?}");
+    for (name, mask, expected) in common::fixture() {
         n_cases += 1;
-        n_voxels += expected.iter().filter(|&&voxel| voxel).count();
+        n_voxels += expected.n_foreground();
+        if mask.n_foreground() > 0 {
+            assert!(common::skeleton_mask(&mask, &params) == expected, "{name} {:?}", mask.grid().shape());
+        }
     }
-    assert!(n_cases == 64 && n_voxels > 1000, "{n_cases} cases, {n_voxels} skeleton voxels");
+    assert!(n_cases == 400 && n_voxels > 10_000, "{n_cases} cases, {n_voxels} skeleton voxels");
 }

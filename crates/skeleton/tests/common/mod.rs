@@ -8,6 +8,8 @@
 #![allow(dead_code, reason = "each test file uses its own part")]
 #![allow(clippy::disallowed_methods, reason = "tests find the real data by ESPALIER_DATA")]
 
+pub(crate) mod curve;
+
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
@@ -92,4 +94,33 @@ pub(crate) fn topology(mask: &Mask) -> (usize, i32) {
 
 fn offsets() -> impl Iterator<Item = [i64; 3]> {
     (0..27).map(|bit| [bit % 3 - 1, bit / 3 % 3 - 1, bit / 9 - 1])
+}
+
+/// Small volumes and what scikit-image 0.26 leaves of them; the format stands in `scripts/lee94-fixture`.
+const FIXTURE: &[u8] = include_bytes!("../../../../fixtures/lee94.tsv.gz");
+
+/// The cases of the fixture: name, volume, skeleton by scikit-image.
+pub(crate) fn fixture() -> Vec<(String, Mask, Mask)> {
+    let mut text = String::new();
+    flate2::read::GzDecoder::new(FIXTURE).read_to_string(&mut text).expect("gzip");
+    let case = |line: &str| {
+        let [name, nx, ny, nz, volume, skeleton] = line.split('\t').collect::<Vec<_>>()[..] else {
+            panic!("not six fields: {line}")
+        };
+        let shape = [nx, ny, nz].map(|extent| extent.parse().expect("an extent"));
+        let mask = |hex| Mask::from_voxels(grid(shape), &unpacked(hex, shape.iter().product()));
+        (name.to_owned(), mask(volume), mask(skeleton))
+    };
+    text.lines().skip(1).map(case).collect()
+}
+
+/// Voxels from hex digits, four to a digit, the first voxel the highest bit.
+fn unpacked(hex: &str, n_voxels: usize) -> Vec<bool> {
+    let bits = hex.chars().flat_map(|digit| {
+        let four = digit.to_digit(16).expect("a hex digit");
+        (0..4).rev().map(move |bit| four >> bit & 1 == 1)
+    });
+    let mut voxels: Vec<bool> = bits.collect();
+    assert!(voxels.len() >= n_voxels && voxels.split_off(n_voxels).iter().all(|&filler| !filler));
+    voxels
 }
