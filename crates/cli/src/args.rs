@@ -9,6 +9,7 @@ const EXAMPLES: &str = "\
 Examples:
   espalier run pipelines/airway.toml                    the embedded phantom, from CT to picture
   espalier run neuron.swc -o out/neuron                 a traced tree, every setting at its default
+  espalier run chest-ct.nii.gz --preset airway          airways, from the trachea to before the leak
   espalier run scan.nii.gz --set volume.method=region-grow \\
       --set volume.upper=-865 --set 'volume.seed_voxel=[58,80,85]'
   espalier run my.toml --from embed --set embed.w_angle=3    again from a stage on
@@ -41,6 +42,13 @@ pub(crate) struct Common {
     /// Change a config key, such as embed.w_angle=3; may be given many times
     #[arg(long = "set", value_name = "KEY=VALUE", global = true, value_parser = parse_override)]
     pub(crate) overrides: Vec<Override>,
+    /// What a scan shows: airway (grown from the trachea, which is found) or vessel (with contrast); short for
+    /// --set volume.preset, and for airway --set tree.root=superior
+    #[arg(long, global = true, value_name = "airway|vessel", value_parser = ["airway", "vessel"])]
+    pub(crate) preset: Option<String>,
+    /// The organ in a label map, by value or name, several with commas; short for --set volume.label
+    #[arg(long, global = true, value_name = "LABEL")]
+    pub(crate) label: Option<String>,
     /// Threads to use [default: one per core]; no result depends on it
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
@@ -50,6 +58,21 @@ pub(crate) struct Common {
     /// Print results and errors only
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
+}
+
+impl Common {
+    /// Puts what the shorthands stand for before the keys that are set, which so have the last word.
+    pub(crate) fn resolve_shorthands(&mut self) {
+        let set = |key: &str, value: &str| Override { key: key.to_owned(), value: value.to_owned() };
+        let mut meant = Vec::new();
+        if let Some(preset) = self.preset.take() {
+            meant.push(set("volume.preset", &preset));
+            meant.extend((preset == "airway").then(|| set("tree.root", "superior")));
+        }
+        // Quoted, so that numbers with commas stay one value.
+        meant.extend(self.label.take().map(|label| set("volume.label", &format!("{label:?}"))));
+        self.overrides.splice(..0, meant);
+    }
 }
 
 /// What to do.
