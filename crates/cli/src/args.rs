@@ -9,9 +9,10 @@ const EXAMPLES: &str = "\
 Examples:
   espalier run pipelines/airway.toml                    the embedded phantom, from CT to picture
   espalier run neuron.swc -o out/neuron                 a traced tree, every setting at its default
-  espalier run chest-ct.nii.gz --preset airway          airways, from the trachea to before the leak
   espalier run scan.nii.gz --set volume.method=region-grow \\
       --set volume.upper=-865 --set 'volume.seed_voxel=[58,80,85]'
+  espalier run dicom/ --series 2 --set volume.method=threshold --set volume.lower=200
+                                                        a folder of DICOM slices; of several series the second
   espalier run my.toml --from embed --set embed.w_angle=3    again from a stage on
   espalier embed out/airway --set embed.pso.freedom=s   one stage of a run folder
   espalier skeleton mask.nii.gz -o out/skeleton         one stage on files
@@ -42,13 +43,12 @@ pub(crate) struct Common {
     /// Change a config key, such as embed.w_angle=3; may be given many times
     #[arg(long = "set", value_name = "KEY=VALUE", global = true, value_parser = parse_override)]
     pub(crate) overrides: Vec<Override>,
-    /// What a scan shows: airway (grown from the trachea, which is found) or vessel (with contrast); short for
-    /// --set volume.preset, and for airway --set tree.root=superior
-    #[arg(long, global = true, value_name = "airway|vessel", value_parser = ["airway", "vessel"])]
-    pub(crate) preset: Option<String>,
-    /// The organ in a label map, by value or name, several with commas; short for --set volume.label
-    #[arg(long, global = true, value_name = "LABEL")]
-    pub(crate) label: Option<String>,
+    /// Which DICOM series of a folder, from 1 as the message lists them; the same as --set input.series=N
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) series: Option<u32>,
+    /// Resample a tilted, uneven or incomplete DICOM series to an even grid; the same as --set input.resample=true
+    #[arg(long, global = true)]
+    pub(crate) resample: bool,
     /// Threads to use [default: one per core]; no result depends on it
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
@@ -60,18 +60,14 @@ pub(crate) struct Common {
     pub(crate) quiet: bool,
 }
 
-impl Common {
-    /// Puts what the shorthands stand for before the keys that are set, which so have the last word.
-    pub(crate) fn resolve_shorthands(&mut self) {
-        let set = |key: &str, value: &str| Override { key: key.to_owned(), value: value.to_owned() };
-        let mut meant = Vec::new();
-        if let Some(preset) = self.preset.take() {
-            meant.push(set("volume.preset", &preset));
-            meant.extend((preset == "airway").then(|| set("tree.root", "superior")));
-        }
-        // Quoted, so that numbers with commas stay one value.
-        meant.extend(self.label.take().map(|label| set("volume.label", &format!("{label:?}"))));
-        self.overrides.splice(..0, meant);
+impl Arguments {
+    /// Adds the keys that have an option of their own to those of `--set`.
+    pub(crate) fn with_all_overrides(mut self) -> Self {
+        let set = |key: &str, value: String| Override { key: key.to_owned(), value };
+        let series = self.common.series.map(|index| set("input.series", index.to_string()));
+        let resample = self.common.resample.then(|| set("input.resample", "true".to_owned()));
+        self.common.overrides.extend(series.into_iter().chain(resample));
+        self
     }
 }
 
@@ -107,7 +103,8 @@ pub(crate) enum Command {
 /// `espalier run`.
 #[derive(Debug, Args)]
 pub(crate) struct RunArguments {
-    /// A config (.toml), or an input: a volume (.nii, .nii.gz, .hdr, .nrrd, .nhdr, .mha, .mhd) or a traced tree (.swc)
+    /// A config (.toml), or an input: a volume (.nii, .nii.gz, .hdr, .nrrd, .nhdr, .mha, .mhd, a folder of
+    /// DICOM slices) or a traced tree (.swc)
     pub(crate) config_or_input: PathBuf,
     /// The run folder [default: out/NAME]
     #[arg(short, long, value_name = "DIR")]
@@ -159,7 +156,8 @@ Examples:
 #[derive(Debug, Args)]
 #[command(after_help = SWEEP_HELP)]
 pub(crate) struct SweepArguments {
-    /// A config (.toml), or an input: a volume (.nii, .nii.gz, .hdr, .nrrd, .nhdr, .mha, .mhd) or a traced tree (.swc)
+    /// A config (.toml), or an input: a volume (.nii, .nii.gz, .hdr, .nrrd, .nhdr, .mha, .mhd, a folder of
+    /// DICOM slices) or a traced tree (.swc)
     pub(crate) config_or_input: PathBuf,
     /// A key and its values; may be given many times, for all combinations
     #[arg(long = "over", value_name = "KEY=V1,V2,…", required = true, value_parser = parse_axis)]

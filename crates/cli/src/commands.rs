@@ -131,9 +131,16 @@ fn make_phantom(arguments: &Arguments, phantom: &PhantomArguments) -> anyhow::Re
 
 fn run_stage(arguments: &Arguments, stage: &StageArguments, which: Stage) -> anyhow::Result<Summary> {
     match stage.inputs.as_slice() {
-        [folder] if folder.is_dir() => run_stage_of_folder(arguments, stage, which, folder),
+        // A folder that is no run is one of DICOM slices.
+        [folder] if folder.is_dir() && (which != Stage::Volume || is_run(folder)) => {
+            run_stage_of_folder(arguments, stage, which, folder)
+        }
         files => run_stage_on_files(arguments, stage, which, files),
     }
+}
+
+fn is_run(folder: &Path) -> bool {
+    folder.join("provenance").is_dir()
 }
 
 /// A stage of a run folder, with the folder's own settings and files.

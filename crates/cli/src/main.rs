@@ -15,15 +15,14 @@ use espalier_model::diagnose::Class;
 
 fn main() -> ExitCode {
     turn_panics_into_exit_code_1();
-    let mut arguments = match args::Arguments::try_parse() {
-        Ok(arguments) => arguments,
+    let arguments = match args::Arguments::try_parse() {
+        Ok(arguments) => arguments.with_all_overrides(),
         Err(error) => {
             // Help and version are results, not errors; clap knows which is which.
             let _ = error.print();
             return ExitCode::from(if error.use_stderr() { Class::Usage.exit_code() } else { 0 });
         }
     };
-    arguments.common.resolve_shorthands();
     match commands::execute(&arguments) {
         Ok(()) if progress::results_arrived() => ExitCode::SUCCESS,
         Ok(()) => ExitCode::from(Class::Io.exit_code()),

@@ -1,6 +1,6 @@
 //! How a result came about: inputs, settings, times.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use espalier_model::Report;
 use espalier_model::table::{Column, Table};
@@ -76,11 +76,15 @@ fn absolute(path: &Path) -> Option<String> {
     std::path::absolute(path).ok().map(|path| path.to_string_lossy().into_owned())
 }
 
-/// Writes `provenance/inputs.tsv`: the input's content, without its name, which may be a patient's.
-pub(crate) fn write_inputs(folder: &mut RunFolder, input: Option<&Path>) -> Result<(), Error> {
-    let mut table = Table::with(&INPUT_COLUMNS).into_string();
-    table.extend(input.map(|path| row(INPUT, path)).transpose()?);
+/// Writes `provenance/inputs.tsv`: the content of the input's files, without their names, which may be a patient's.
+/// A DICOM series has a row for each slice, by position.
+pub(crate) fn write_inputs(folder: &mut RunFolder, input: &[PathBuf]) -> Result<(), Error> {
+    let table = Table::with(&INPUT_COLUMNS).into_string() + &input_rows(input)?;
     folder.write(INPUTS_FILE, table.as_bytes())
+}
+
+fn input_rows(input: &[PathBuf]) -> Result<String, Error> {
+    input.iter().map(|path| row(INPUT, path)).collect()
 }
 
 /// Brings the row of the manual edits in `provenance/inputs.tsv` up to date.
@@ -95,19 +99,17 @@ pub(crate) fn write_edits(folder: &mut RunFolder, edits: Option<&Path>) -> Resul
     folder.write(INPUTS_FILE, table.as_bytes())
 }
 
-/// Whether the folder's results were made from a file of other content.
-pub(crate) fn is_other_input(folder: &RunFolder, input: &Path) -> Result<bool, Error> {
-    is_other(folder, INPUT, input)
+/// Whether the folder's results were made from files of other content.
+pub(crate) fn is_other_input(folder: &RunFolder, input: &[PathBuf]) -> Result<bool, Error> {
+    let Some(known) = rows(folder)? else { return Ok(false) };
+    let known: String = known.split_inclusive('\n').filter(|row| is_of(INPUT, row)).collect();
+    Ok(known != input_rows(input)?)
 }
 
 /// Whether the folder's embedding was made with manual edits of other content.
 pub(crate) fn is_other_edits(folder: &RunFolder, edits: &Path) -> Result<bool, Error> {
-    is_other(folder, EDITS, edits)
-}
-
-fn is_other(folder: &RunFolder, role: &str, path: &Path) -> Result<bool, Error> {
     let Some(known) = rows(folder)? else { return Ok(false) };
-    let now = row(role, path)?;
+    let now = row(EDITS, edits)?;
     Ok(!known.split_inclusive('\n').any(|row| row == now))
 }
 

@@ -78,7 +78,8 @@ fn run_stages(request: &Request, events: &(dyn Fn(Event) + Sync)) -> Result<Summ
     // A missing input must not leave a folder behind.
     let edits = artifacts.edits_path.as_ref().filter(|_| stages.contains(&Stage::Embed));
     for path in [input.as_ref(), edits].into_iter().flatten() {
-        steps::check_readable(path)?;
+        let may_be_folder = matches!(source, Source::Volume(_)) && Some(path) == input.as_ref();
+        steps::check_readable(path, may_be_folder)?;
     }
 
     let mut folder = RunFolder::open(&request.out)?;
@@ -126,7 +127,8 @@ impl Run<'_> {
             if Some(&stage) == stages.first() {
                 self.clear_away(folder, &settings)?;
                 if Some(stage) == stages_of(&self.source).first().copied() {
-                    provenance::write_inputs(folder, input)?;
+                    let files = input.map(|input| self.input_files(stage, input)).transpose()?;
+                    provenance::write_inputs(folder, &files.unwrap_or_default())?;
                 }
             }
             let edits = self.artifacts.edits_path.as_deref();
@@ -177,10 +179,19 @@ impl Run<'_> {
         // Scans of many patients share one name; their content tells them apart. A scan that lies elsewhere now, or
         // nowhere, is no reason to stop: nothing will be read from it.
         let (Source::Volume(input) | Source::Tree(input)) = &self.source else { return Ok(()) };
-        if input.is_file() && provenance::is_other_input(folder, input)? {
+        if input.exists() && provenance::is_other_input(folder, &self.input_files(available[0], input)?)? {
             return Err(Error::OtherInput { from, path: input.clone(), first: available[0] });
         }
         Ok(())
+    }
+
+    /// The files that an input is read from: several where it is a DICOM series.
+    fn input_files(&self, stage: Stage, input: &Path) -> Result<Vec<PathBuf>, Error> {
+        match self.source {
+            Source::Volume(_) => espalier_volume::files(input, &self.artifacts.read_options)
+                .map_err(|error| Error::stage(stage)(boxed(error))),
+            _ => Ok(vec![input.to_owned()]),
+        }
     }
 
     /// Removes what is not of this run: everything, if input or seed are others; else the files of stages that a run
@@ -275,6 +286,8 @@ fn artifacts_of(request: &Request, source: &Source) -> Artifacts {
             assume_space: input.assume_space,
             unit_mm: (input.unit != Unit::Auto).then(|| input.unit.mm()),
             strict: input.strict,
+            series: input.series,
+            resample: input.resample,
         },
         input: input.clone(),
         ..Artifacts::default()

@@ -1,6 +1,6 @@
 //! File → [`Volume`].
 //!
-//! **Input** a path to a volume file. **Output** [`Loaded`].
+//! **Input** a path to a volume file, or to a folder of DICOM slices. **Output** [`Loaded`].
 //! **Steps** 1. open the file and check its header; 2. compare the declared size with what the caller allows;
 //! 3. place the voxels in the world; 4. read them, and read on to the end so that the checksum is verified;
 //! 5. resample where the axes are sheared.
@@ -9,11 +9,12 @@
 //! precision, so that a file that we write of this grid places its voxels exactly where this volume has them.
 //! **Cost** O(bytes) time.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use espalier_model::nifti_out::stored_grid;
 use espalier_model::{Grid, GridError, Report, Volume};
 
+use crate::dicom::{self, Assembled};
 use crate::stored::Stored;
 use crate::{Error, ReadError, ReadOptions, decode, orthogonal};
 
@@ -26,7 +27,19 @@ pub struct Loaded {
     pub report: Report,
 }
 
-/// Reads the volume in a file.
+/// The files that [`read`] takes a volume from: the file itself, or those of a DICOM series by position.
+///
+/// # Errors
+/// As [`read`], as far as headers tell.
+pub fn files(path: &Path, options: &ReadOptions) -> Result<Vec<PathBuf>, Error> {
+    let listed = |path: &Path| match dicom::is_dicom(path)? {
+        true => dicom::files(path, options),
+        false => Ok(vec![path.to_owned()]),
+    };
+    listed(path).map_err(|problem| Error::Read { problem, path: path.to_owned() })
+}
+
+/// Reads the volume in a file, or that of a DICOM series: a folder, or one file of it.
 ///
 /// # Errors
 /// [`Error::Read`] with the path: missing or unreadable files, malformed, truncated or damaged ones, more voxels
@@ -38,6 +51,9 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded, Error> {
 
 fn read_any(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
     let mut report = Report::default();
+    if dicom::is_dicom(path)? {
+        return read_dicom(path, options, report);
+    }
     let mut stored = Stored::open(path, options, &mut report)?;
     check_limit(stored.memory_bytes(), options)?;
 
@@ -56,6 +72,17 @@ fn read_any(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
     };
     count_grid(&grid, &mut report);
     let volume = Volume::new(grid, voxels, stored.slope, stored.intercept);
+    Ok(Loaded { volume, report })
+}
+
+fn read_dicom(path: &Path, options: &ReadOptions, mut report: Report) -> Result<Loaded, ReadError> {
+    let Assembled { shape, world_from_voxel, voxels, slope, intercept } =
+        dicom::read(path, options, &mut report)?;
+    let grid = Grid::new(shape, world_from_voxel).and_then(|grid| stored_grid(&grid));
+    let form = "position and orientation of the slices";
+    let grid = grid.map_err(|problem| ReadError::Grid { form, problem })?;
+    count_grid(&grid, &mut report);
+    let volume = Volume::new(grid, voxels, slope, intercept);
     Ok(Loaded { volume, report })
 }
 

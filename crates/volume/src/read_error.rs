@@ -7,10 +7,15 @@ use espalier_model::{Diagnose, GridError};
 use glam::DVec3;
 use thiserror::Error;
 
+use crate::dicom::DicomError;
+
 /// What is wrong with a file.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ReadError {
+    /// A DICOM series that cannot be read.
+    #[error(transparent)]
+    Dicom(Box<DicomError>),
     /// Missing, unreadable, or the disk fails.
     #[error("cannot read: {0}")]
     Io(#[from] std::io::Error),
@@ -184,9 +189,16 @@ impl ReadError {
     }
 }
 
+impl From<DicomError> for ReadError {
+    fn from(error: DicomError) -> Self {
+        Self::Dicom(Box::new(error))
+    }
+}
+
 impl Diagnose for ReadError {
     fn code(&self) -> &'static str {
         match self {
+            Self::Dicom(error) => error.code(),
             Self::Io(_) => "E-VOLUME-IO",
             Self::NotAFile { .. } => "E-VOLUME-NOT-A-FILE",
             Self::Empty => "E-VOLUME-EMPTY-FILE",
@@ -214,6 +226,7 @@ impl Diagnose for ReadError {
 
     fn class(&self) -> Class {
         match self {
+            Self::Dicom(error) => error.class(),
             Self::Io(_) | Self::NotAFile { .. } => Class::Io,
             Self::TooLarge { .. } | Self::NoMemory { .. } => Class::Limit,
             Self::VolumeIndex { .. } => Class::Usage,
@@ -224,6 +237,7 @@ impl Diagnose for ReadError {
 
     fn hint(&self) -> String {
         match self {
+            Self::Dicom(error) => return error.hint(),
             Self::Io(error) if error.kind() == std::io::ErrorKind::NotFound => {
                 "check the path; input.path is relative to the config file"
             }

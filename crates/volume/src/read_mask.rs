@@ -2,8 +2,8 @@
 //!
 //! **Input** a path to a volume file, and [`Params`]. **Output** [`Segmented`], whose report begins with the reader's.
 //! **Steps** 1. where the choice depends on each value alone, the bits of the voxels straight from the file, and what
-//! kind of volume it is; 2. else, or where sheared axes must be made orthogonal, the whole volume; 3. what
-//! [`segment`] does then.
+//! kind of volume it is; 2. else, for DICOM slices, or where sheared axes must be made orthogonal, the whole volume;
+//! 3. what [`segment`] does then.
 //! **Guarantees** the same result as [`read`] and [`segment`]; straight from the file, memory is the bits.
 //! **Cost** one pass over the file; a second one for a mask of which some values are not finite, and for a volume of
 //! more than two values that is to be taken for a mask but does not begin with 0.
@@ -12,12 +12,13 @@ use std::path::Path;
 
 use espalier_model::{Bits, Report};
 
+use crate::dicom;
 use crate::read::{check_limit, count_grid, orthogonal_grid};
 use crate::segment::segment_selection;
-use crate::select::{MASK, Selection, Wish, background, is_in_mask, needs_preset, wish};
+use crate::select::{MASK, Selection, Wish, background, is_in_mask, wish};
 use crate::stored::Stored;
 use crate::stream::{self, Inspected};
-use crate::{Error, Kind, Params, ReadError, ReadOptions, Segmented, read, segment};
+use crate::{Error, Kind, Method, Params, ReadError, ReadOptions, Segmented, read, segment};
 
 /// Reads the volume in a file and makes a mask of it.
 ///
@@ -26,6 +27,9 @@ use crate::{Error, Kind, Params, ReadError, ReadOptions, Segmented, read, segmen
 pub fn read_mask(path: &Path, options: &ReadOptions, params: &Params) -> Result<Segmented, Error> {
     params.validate()?;
     let file = File { path, options };
+    if file.named(dicom::is_dicom(path))? {
+        return file.segment_whole(params);
+    }
     let mut report = Report::default();
     let mut stored = file.open(&mut report)?;
     let grid = file.named(orthogonal_grid(&stored, options))?;
@@ -34,9 +38,7 @@ pub fn read_mask(path: &Path, options: &ReadOptions, params: &Params) -> Result<
         None => None,
     };
     let (Some(selection), Some(grid)) = (selection, grid) else {
-        let loaded = read(path, options)?;
-        let segmented = segment(&loaded.volume, params)?;
-        return Ok(after(loaded.report, segmented));
+        return file.segment_whole(params);
     };
     count_grid(&grid, &mut report);
     let segmented = segment_selection(selection, &grid, params, || {
@@ -64,6 +66,11 @@ impl File<'_> {
         self.named(Stored::open(self.path, self.options, report))
     }
 
+    fn segment_whole(&self, params: &Params) -> Result<Segmented, Error> {
+        let loaded = read(self.path, self.options)?;
+        Ok(after(loaded.report, segment(&loaded.volume, params)?))
+    }
+
     fn named<T>(&self, result: Result<T, ReadError>) -> Result<T, Error> {
         result.map_err(|problem| Error::Read { problem, path: self.path.to_owned() })
     }
@@ -76,44 +83,35 @@ impl File<'_> {
         report: &mut Report,
     ) -> Result<Option<Selection>, Error> {
         match wish(params) {
-            Wish::Names(_) | Wish::Region => Ok(None),
+            Wish::Region => Ok(None),
             Wish::Values { is_wanted, what } => {
                 self.named(check_limit(bits_bytes(stored), self.options))?;
                 let bits = self.named(stream::choose(stored, is_wanted, report))?;
-                Ok(Some(Selection::of(bits, what)))
+                Ok(Some(Selection { bits, what }))
             }
             Wish::Kind => {
                 self.named(check_limit(bits_bytes(stored), self.options))?;
-                let bits = self.mask_bits(stored, params, report)?;
-                Ok(bits.map(|bits| Selection::of(bits, MASK)))
+                let bits = self.mask_bits(stored, params.method, report)?;
+                Ok(Some(Selection { bits, what: MASK.to_owned() }))
             }
         }
     }
 
-    /// The voxels that are not background, in a volume that says itself which those are; none for a scan with a
-    /// preset.
-    fn mask_bits(
-        &self,
-        stored: &mut Stored,
-        params: &Params,
-        report: &mut Report,
-    ) -> Result<Option<Bits>, Error> {
+    /// The voxels that are not background, in a volume that says itself which those are.
+    fn mask_bits(&self, stored: &mut Stored, method: Method, report: &mut Report) -> Result<Bits, Error> {
         let Inspected { census, mut bits, first, is_exact } = self.named(stream::inspect(stored, report))?;
         let kind = census.kind();
-        if params.preset.is_some() && needs_preset(&kind, params.method) {
-            return Ok(None);
-        }
         let has_two_values = matches!(kind, Kind::Mask { .. });
-        let background = background(kind, params.method)?;
+        let background = background(kind, method)?;
         if is_exact && first == background {
-            return Ok(Some(bits));
+            return Ok(bits);
         }
         if is_exact && has_two_values {
             invert(&mut bits);
-            return Ok(Some(bits));
+            return Ok(bits);
         }
         let mut again = self.open(&mut Report::default())?;
-        self.named(stream::choose(&mut again, is_in_mask(background), &mut Report::default())).map(Some)
+        self.named(stream::choose(&mut again, is_in_mask(background), &mut Report::default()))
     }
 }
 

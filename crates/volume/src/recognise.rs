@@ -13,7 +13,7 @@ pub(crate) const N_LOOKED_AT: usize = 512;
 
 /// What is read, for messages.
 pub(crate) const READABLE: &str = "NIfTI-1 and NIfTI-2 (.nii, .nii.gz, .hdr with .img), NRRD (.nrrd, .nhdr), \
-                                   MetaImage (.mha, .mhd)";
+                                   MetaImage (.mha, .mhd), folders of DICOM slices";
 
 /// A format of volumes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

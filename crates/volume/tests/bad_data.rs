@@ -9,8 +9,15 @@ use espalier_model::Diagnose;
 use espalier_volume::{Error, ReadError, ReadOptions, read};
 
 /// Enough for every legal file of the data, too little for the bombs.
-const OPTIONS: ReadOptions =
-    ReadOptions { max_bytes: 16 << 20, volume_index: None, assume_space: None, unit_mm: None, strict: false };
+const OPTIONS: ReadOptions = ReadOptions {
+    max_bytes: 16 << 20,
+    volume_index: None,
+    assume_space: None,
+    unit_mm: None,
+    strict: false,
+    series: None,
+    resample: false,
+};
 
 /// `shape orientation warnings`, or the error's code and exit code.
 fn outcome(path: &Path, options: &ReadOptions) -> String {
@@ -74,7 +81,8 @@ fn missing_folder_empty() {
     let path = |name: &str| folder.path().join(name);
     std::fs::write(path("empty.nii.gz"), b"").expect("writable");
     assert_eq!(outcome(&path("none.nii"), &OPTIONS), "E-VOLUME-IO 74");
-    assert_eq!(outcome(folder.path(), &OPTIONS), "E-VOLUME-NOT-A-FILE 74");
+    // A folder is taken for one of DICOM slices.
+    assert_eq!(outcome(folder.path(), &OPTIONS), "E-DICOM-NONE 3");
     assert_eq!(outcome(&path("empty.nii.gz"), &OPTIONS), "E-VOLUME-EMPTY-FILE 3");
 }
 

@@ -42,30 +42,26 @@ fn methods() {
     let all = Params { components: Components::All, ..Params::default() };
     check("..77 7...", &all, "..## #...");
     check("4466", &all, "..##");
-    check("0123 0321", &Params { label: Some(2.0.into()), ..all }, "..#. ..#.");
-    let band = Params { method: Method::Threshold, lower: Some(2.0), upper: Some(3.0), ..all.clone() };
+    check("0123 0321", &Params { label: Some(2.0), ..all }, "..#. ..#.");
+    let band = Params { method: Method::Threshold, lower: Some(2.0), upper: Some(3.0), ..all };
     check("01234567", &band, "..##....");
-    check("0120", &Params { method: Method::Mask, ..all.clone() }, ".##.");
+    check("0120", &Params { method: Method::Mask, ..all }, ".##.");
     // Over faces only, ends of the band included, and never out of the row into the next.
-    let grow =
-        Params { method: Method::RegionGrow, lower: Some(3.0), seed_voxel: Some([0, 0, 0]), ..all };
+    let grow = Params { method: Method::RegionGrow, lower: Some(3.0), seed_voxel: Some([0, 0, 0]), ..all };
     check("35.9 .49. ...9", &grow, "##.. .##. ....");
     check("5..5 ....", &grow, "#... ....");
-    let by_mm = Params { seed_voxel: None, seed_mm: Some([13.4, 10.9, 10.0]), ..grow.clone() };
+    let by_mm = Params { seed_voxel: None, seed_mm: Some([13.4, 10.9, 10.0]), ..grow };
     check("5..5 ....", &by_mm, "...# ....");
 
     assert_eq!(code("0123", &Params::default()), "E-VOLUME-METHOD 2");
     assert_eq!(code("0000", &Params::default()), "E-VOLUME-EMPTY 3");
     assert_eq!(code("0000", &Params { method: Method::Mask, ..Params::default() }), "E-VOLUME-EMPTY 3");
-    assert_eq!(code("0012", &Params { label: Some(5.0.into()), ..Params::default() }), "E-VOLUME-EMPTY 3");
+    assert_eq!(code("0012", &Params { label: Some(5.0), ..Params::default() }), "E-VOLUME-EMPTY 3");
     assert_eq!(code("0012", &Params { lower: Some(9.0), ..band }), "E-PARAM 2");
     assert_eq!(code("0012", &grow), "E-VOLUME-EMPTY 3");
     assert_eq!(code("0092", &grow), "E-VOLUME-SEED-BAND 2");
     for seed in [[-1, 0, 0], [4, 0, 0], [0, i64::MAX, 0], [0, 0, i64::MIN]] {
-        assert_eq!(
-            code("9092", &Params { seed_voxel: Some(seed), ..grow.clone() }),
-            "E-VOLUME-SEED-OUTSIDE 2"
-        );
+        assert_eq!(code("9092", &Params { seed_voxel: Some(seed), ..grow }), "E-VOLUME-SEED-OUTSIDE 2");
     }
 }
 
@@ -159,10 +155,6 @@ fn parameters_are_checked() {
     let cases = [
         ("", ""),
         ("label = 3", ""),
-        ("label = 'trachea, 4'", ""),
-        ("label = [1, 'trachea']", ""),
-        ("label = ''", "label"),
-        ("label = nan", "label"),
         ("method = 'mask'\nlabel = 3", "label"),
         ("lower = 3", "lower"),
         ("method = 'label'", "label"),

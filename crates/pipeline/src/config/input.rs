@@ -54,8 +54,8 @@ impl Unit {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Input {
-    /// A volume (NIfTI, NRRD, MetaImage: `.nii`, `.nii.gz`, `.hdr`, `.nrrd`, `.nhdr`, `.mha`, `.mhd`) or a traced
-    /// tree (`.swc`). Relative to the config's folder; `$ESPALIER_DATA` at its beginning is expanded.
+    /// A volume (NIfTI, NRRD, MetaImage: `.nii`, `.nii.gz`, `.hdr`, `.nrrd`, `.nhdr`, `.mha`, `.mhd`; a folder of
+    /// DICOM slices, or one of them) or a traced tree (`.swc`). Relative to the config's folder; `$ESPALIER_DATA` at its beginning is expanded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub path: Option<String>,
     /// Instead of a file: the phantom to make; `[phantom]` has its shape.
@@ -66,6 +66,13 @@ pub struct Input {
     /// Which volume of a 4D file, from 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volume_index: Option<usize>,
+    /// Which DICOM series of a folder, from 1 as the message lists them. Default: the only one that can be a volume.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub series: Option<usize>,
+    /// Resample DICOM slices of a tilted gantry, with gaps or at uneven distances to an even orthogonal grid. Default
+    /// false: they are refused with the reason.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub resample: bool,
     /// What to make of a volume whose header does not say where it lies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub assume_space: Option<espalier_volume::AssumedSpace>,
@@ -87,6 +94,8 @@ impl Default for Input {
             phantom: None,
             kind: InputKind::Auto,
             volume_index: None,
+            series: None,
+            resample: false,
             assume_space: None,
             strict: false,
             unit: Unit::Auto,
@@ -122,6 +131,7 @@ impl Input {
             "a run needs an input: set path to a file, or phantom = \"airway\" | \"vessel\" | \"neuron\"",
         )?;
         ParamError::check("path", !(has_path && self.phantom.is_some()), "set path or phantom, not both")?;
+        ParamError::check("series", self.series != Some(0), "series count from 1, is 0")?;
         let is_scaled = self.scale != [1.0; 3] || self.radius_scale != 1.0;
         let is_used = !is_scaled || self.is_traced();
         ParamError::check(

@@ -1,0 +1,308 @@
+//! DICOM series made here: order, several series, duplicates, gaps, tilt, scaling, padding, and hostile bytes.
+#![allow(clippy::expect_used, clippy::panic, reason = "this is how a test speaks")]
+
+mod slices;
+
+use espalier_geom::random::{Purpose, Stream};
+use espalier_model::{Diagnose, Volume};
+use espalier_volume::{DicomError, Error, Loaded, ReadError, ReadOptions, files, read};
+use glam::DVec3;
+use slices::{Slice, stack, write};
+
+fn scratch() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a folder for temporary files")
+}
+
+fn read_slices(slices: &[Slice], options: &ReadOptions) -> Result<Loaded, Error> {
+    let folder = scratch();
+    write(folder.path(), slices, |index| format!("{index}.dcm"));
+    read(folder.path(), options)
+}
+
+fn loaded(slices: &[Slice]) -> Loaded {
+    read_slices(slices, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn dicom_error(result: Result<Loaded, Error>) -> DicomError {
+    match result {
+        Err(Error::Read { problem: ReadError::Dicom(error), .. }) => *error,
+        Err(error) => panic!("{error}"),
+        Ok(_) => panic!("it was read"),
+    }
+}
+
+fn code_of(slices: &[Slice]) -> &'static str {
+    dicom_error(read_slices(slices, &ReadOptions::default())).code()
+}
+
+const RESAMPLE: ReadOptions = ReadOptions {
+    max_bytes: 4 << 30,
+    volume_index: None,
+    assume_space: None,
+    unit_mm: None,
+    strict: false,
+    series: None,
+    resample: true,
+};
+
+fn value_at(volume: &Volume, [x, y, z]: [f64; 3]) -> f64 {
+    let voxel = volume.grid().voxel_from_world().transform_point3(DVec3::new(x, y, z));
+    let nearest = volume.grid().voxel_at(voxel).expect("inside");
+    assert!(
+        (voxel - DVec3::from_array(nearest.map(|v| v as f64))).length() < 1e-4,
+        "{voxel} is between voxels"
+    );
+    volume.value(volume.grid().index(nearest))
+}
+
+/// File names, their order, and other files do not matter; positions do, and thickness does not.
+#[test]
+fn slices_in_any_order() {
+    let folder = scratch();
+    let heights = [7.5, -2.5, 2.5, 0.0, 5.0];
+    let paths =
+        write(folder.path(), &stack(&heights), |index| ["x", "b.dcm", "0", "IM.1.2", "zz"][index].to_owned());
+    std::fs::write(folder.path().join("notes.txt"), "nothing").expect("writable");
+    std::fs::write(folder.path().join("empty"), "").expect("writable");
+    std::fs::create_dir(folder.path().join("more")).expect("writable");
+    let localizer = Slice { series: 1, orientation: [0.0, 1.0, 0.0, 0.0, 0.0, -1.0], ..Slice::at(0.0) };
+    let localizer = localizer.with(0x0008_0008, "CS", b"ORIGINAL\\PRIMARY\\LOCALIZER");
+    write(&folder.path().join("more"), &[localizer], |_| "scout".to_owned());
+
+    let loaded = read(folder.path(), &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let grid = loaded.volume.grid();
+    assert_eq!((grid.shape(), grid.orientation().as_str()), ([6, 5, 5], "LPS"));
+    assert!((grid.spacing_mm() - DVec3::new(0.75, 0.5, 2.5)).length() < 1e-6);
+    assert_eq!(loaded.report.get("dicom_other_series"), Some(1.0));
+    assert_eq!(loaded.report.get("files_not_dicom"), Some(2.0));
+    assert!(loaded.report.warnings.is_empty());
+    // The first pixel of the slice at 5 mm lies at LPS (-20, -30, 5), which is RAS (20, 30, 5).
+    assert_eq!(value_at(&loaded.volume, [20.0, 30.0, 5.0]), -500.0);
+    assert_eq!(value_at(&loaded.volume, [20.0 - 3.0 * 0.75, 30.0 - 2.0 * 0.5, -2.5]), -1000.0 - 300.0 + 23.0);
+
+    let by_position = [1, 3, 2, 4, 0].map(|index: usize| paths[index].clone());
+    assert_eq!(files(folder.path(), &ReadOptions::default()).expect("readable"), by_position);
+    // One file stands for its series.
+    let by_file = read(&paths[2], &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(by_file.volume, loaded.volume);
+}
+
+#[test]
+fn several_series_are_listed() {
+    let mut both = stack(&[0.0, 1.0, 2.0]);
+    both.extend(stack(&[0.0, 3.0, 6.0, 9.0]).into_iter().map(|slice| Slice {
+        series: 8,
+        intercept: 0.0,
+        ..slice
+    }));
+    let error = dicom_error(read_slices(&both, &ReadOptions::default()));
+    assert_eq!((error.code(), error.class().exit_code()), ("E-DICOM-SERIES", 2));
+    let hint = error.hint();
+    assert!(hint.contains("--series 1: number 3, CT, 3 images of 6x5, 0.750 x 0.500 x 1.000 mm"), "{hint}");
+    assert!(hint.contains("--series 2: number 8, CT, 4 images"), "{hint}");
+    assert!(slices::SECRETS.iter().all(|secret| !hint.contains(secret)));
+
+    let second =
+        read_slices(&both, &ReadOptions { series: Some(2), ..ReadOptions::default() }).expect("chosen");
+    assert_eq!(second.volume.grid().shape(), [6, 5, 4]);
+    let none = dicom_error(read_slices(&both, &ReadOptions { series: Some(3), ..ReadOptions::default() }));
+    assert!(matches!(none, DicomError::NoSuchSeries { index: 3, .. }));
+}
+
+#[test]
+fn one_place_several_images() {
+    let same = stack(&[0.0, 1.0, 1.0, 2.0]);
+    let merged = loaded(&same);
+    assert_eq!(merged.volume.grid().shape(), [6, 5, 3]);
+    assert_eq!(merged.report.warnings[0].code, "W-DICOM-DUPLICATE");
+
+    let mut differing = same;
+    differing[2].values[7] += 1;
+    assert_eq!(code_of(&differing), "E-DICOM-DUPLICATE");
+
+    // Two times of one scan are two series.
+    let at = |time: &'static [u8]| {
+        stack(&[0.0, 1.0, 2.0]).into_iter().map(move |s| s.with(0x0020_0100, "IS", time))
+    };
+    let mut times: Vec<Slice> = at(b"1").chain(at(b"2")).collect();
+    times[4].values[0] = 77;
+    let error = dicom_error(read_slices(&times, &ReadOptions::default()));
+    assert!(error.hint().contains("(time 2)"), "{}", error.hint());
+    let second =
+        read_slices(&times, &ReadOptions { series: Some(2), ..ReadOptions::default() }).expect("chosen");
+    assert_eq!(second.volume.value(30), 77.0 - 1000.0);
+}
+
+#[test]
+fn gaps_and_uneven_distances() {
+    let gap = stack(&[0.0, 2.0, 4.0, 10.0, 12.0, 14.0]);
+    let error = dicom_error(read_slices(&gap, &ReadOptions::default()));
+    assert_eq!(error.code(), "E-DICOM-GAP");
+    assert!(error.to_string().contains("2 slices are missing after slice 3 at 4.00 mm"), "{error}");
+    let filled = read_slices(&gap, &RESAMPLE).expect("resampled");
+    assert_eq!(filled.volume.grid().shape(), [6, 5, 8]);
+    assert_eq!(filled.report.warnings[0].code, "W-DICOM-RESAMPLED");
+    // Values grow by 100 a mm of height, so between slices too.
+    assert_eq!(value_at(&filled.volume, [20.0, 30.0, 8.0]), -200.0);
+
+    let uneven = stack(&[0.0, 2.0, 4.0, 7.0, 10.0, 13.0]);
+    let error = dicom_error(read_slices(&uneven, &ReadOptions::default()));
+    assert_eq!(error.code(), "E-DICOM-SPACING");
+    assert!(error.to_string().contains("from 2.000 to 3.000 mm"), "{error}");
+
+    // Positions written with one decimal are even: 0.625 mm apart.
+    let rounded: Vec<f64> = (0..40).map(|i| (f64::from(i) * 6.25).round() / 10.0).collect();
+    assert!((loaded(&stack(&rounded)).volume.grid().spacing_mm().z - 0.625).abs() < 0.002);
+    assert_eq!(code_of(&stack(&[0.0])), "E-DICOM-SINGLE");
+}
+
+/// A tilted gantry: where the value tells the place, resampling must put it there.
+#[test]
+fn tilt_is_refused_or_resampled() {
+    let size = [24, 30];
+    let tilt = |z: f64| {
+        let value = |i: usize| {
+            let [x, y] = [(i % 24) as f64, (i / 24) as f64];
+            // The value is linear in the place: 2 x + 20 y + 8 z in mm.
+            let [along, down] = [(-20.0 + 0.75 * x), (-30.0 + 0.2 * z + 0.5 * y)];
+            (2.0 * along + 20.0 * down + 8.0 * z).round() as i16
+        };
+        let values = (0..720).map(value).collect();
+        Slice { position: [-20.0, -30.0 + 0.2 * z, z], size, values, intercept: 0.0, ..Slice::at(z) }
+    };
+    let slices: Vec<Slice> = (0..6).map(|i| tilt(f64::from(i) * 2.5)).collect();
+    let error = dicom_error(read_slices(&slices, &ReadOptions::default()));
+    assert_eq!(error.code(), "E-DICOM-TILT");
+    assert!(error.to_string().contains("tilted by 11.3 degrees"), "{error}");
+    assert!(error.to_string().contains("0.500 mm aside"), "{error}");
+
+    let resampled = read_slices(&slices, &RESAMPLE).expect("resampled");
+    let grid = resampled.volume.grid();
+    // Slices are moved by a whole row each, so five rows are added and no value is blended.
+    assert_eq!(grid.shape(), [24, 35, 6]);
+    let lowest = -1.0 + resampled.volume.map_values(|v| v).into_iter().fold(f64::INFINITY, f64::min);
+    let mut n_outside = 0;
+    for index in 0..grid.n_voxels() {
+        let [x, y, z] = grid.voxel(index);
+        let ras = grid.world_from_voxel().transform_point3(DVec3::new(x as f64, y as f64, z as f64));
+        let expected = 2.0 * -ras.x + 20.0 * -ras.y + 8.0 * ras.z;
+        let found = resampled.volume.value(index);
+        if (z..z + 30).contains(&y) {
+            assert!((found - expected).abs() < 0.51, "{found} at {ras}, expected {expected}");
+        } else {
+            n_outside += 1;
+            assert!(found < lowest + 1.5, "{found}");
+        }
+    }
+    assert_eq!(n_outside, 24 * 5 * 6);
+}
+
+#[test]
+fn scaling_and_padding() {
+    let mut slices = stack(&[0.0, 1.0, 2.0]);
+    slices[1].slope = 2.0;
+    slices[2].intercept = 24.0;
+    let each = loaded(&slices);
+    assert_eq!([0, 30, 60].map(|i| each.volume.value(i)), [-1000.0, 200.0 - 1000.0, 200.0 + 24.0]);
+    assert_eq!(each.report.get("dicom_scalings"), Some(3.0));
+
+    let mut padded = stack(&[0.0, 1.0]);
+    padded[1].values[3] = -2000;
+    let padded: Vec<Slice> =
+        padded.into_iter().map(|s| s.with(0x0028_0120, "SS", &(-2000_i16).to_le_bytes())).collect();
+    let read = loaded(&padded);
+    assert_eq!(read.volume.value(33), -1000.0, "the smallest value that is no padding");
+    assert_eq!(read.report.get("dicom_padding_voxels"), Some(1.0));
+
+    // Overlays in the bits above, 12 bits stored, unsigned.
+    let mut overlaid = stack(&[0.0, 1.0]);
+    overlaid[0].values[2] |= 0x7000;
+    let short = |v: u16| v.to_le_bytes();
+    let overlaid: Vec<Slice> = overlaid
+        .into_iter()
+        .map(|s| {
+            s.with(0x0028_0101, "US", &short(12)).with(0x0028_0102, "US", &short(11)).with(
+                0x0028_0103,
+                "US",
+                &short(0),
+            )
+        })
+        .collect();
+    assert_eq!(loaded(&overlaid).volume.value(2), 2.0 - 1000.0);
+}
+
+#[test]
+fn what_is_refused() {
+    let all = |tag: u32, representation: &'static str, value: &[u8]| {
+        code_of(
+            &stack(&[0.0, 1.0]).into_iter().map(|s| s.with(tag, representation, value)).collect::<Vec<_>>(),
+        )
+    };
+    assert_eq!(all(0x0028_0004, "CS", b"RGB"), "E-DICOM-COLOR");
+    assert_eq!(all(0x0028_0008, "IS", b"12"), "E-DICOM-MULTIFRAME");
+    assert_eq!(all(0x0020_0032, "DS", b"1\\2"), "E-DICOM-FIELD");
+    assert_eq!(all(0x0020_0032, "DS", b"1\\2\\nan"), "E-DICOM-FIELD");
+    assert_eq!(all(0x0020_0037, "DS", b"1\\0\\0\\1\\0\\0"), "E-DICOM-FIELD");
+    assert_eq!(all(0x0028_0030, "DS", b"0\\0"), "E-DICOM-FIELD");
+    assert_eq!(all(0x0028_0100, "US", &[32, 0]), "E-DICOM-BITS");
+    assert_eq!(all(0x0028_0010, "US", &[0xFF, 0xFF]), "E-DICOM-TRUNCATED");
+
+    // A damaged slice of the series is never left out in silence.
+    let folder = scratch();
+    let paths = write(folder.path(), &stack(&[0.0, 1.0, 2.0]), |index| index.to_string());
+    let bytes = std::fs::read(&paths[2]).expect("readable");
+    std::fs::write(&paths[2], &bytes[..bytes.len() - 4]).expect("writable");
+    let error = dicom_error(read(folder.path(), &ReadOptions::default()));
+    assert!(error.to_string().contains("60 bytes of pixels expected, 56 found (in 2)"), "{error}");
+    // One of another series is.
+    std::fs::write(&paths[2], &Slice { series: 9, ..Slice::at(5.0) }.bytes()[..660]).expect("writable");
+    assert!(read(folder.path(), &ReadOptions::default()).is_ok());
+
+    let limit = ReadOptions { max_bytes: 1000, ..ReadOptions::default() };
+    let error = read_slices(&stack(&[0.0, 1.0]), &limit).expect_err("too large");
+    assert_eq!((error.code(), error.class().exit_code()), ("E-VOLUME-TOO-LARGE", 5));
+    let empty = scratch();
+    assert_eq!(dicom_error(read(empty.path(), &ReadOptions::default())).code(), "E-DICOM-NONE");
+}
+
+/// Mutants of a series, one file of it changed each time: no panic, and nothing beyond the limit.
+#[test]
+fn mutants_never_panic() {
+    let folder = scratch();
+    let slices = stack(&[0.0, 1.0, 2.0, 3.0]);
+    let paths = write(folder.path(), &slices, |index| index.to_string());
+    let options = ReadOptions { max_bytes: 1 << 20, ..ReadOptions::default() };
+    let mut stream = Stream::new(23, Purpose::Test, 0, 0);
+    let (mut n_read, mut n_refused) = (0, 0);
+    for round in 0..1000_usize {
+        let path = &paths[round % 4];
+        let original = slices[round % 4].bytes();
+        let mut bytes = original.clone();
+        for _ in 0..1 + stream.below(3) {
+            let at = 128 + stream.below(bytes.len() as u32 - 128) as usize;
+            match stream.below(8) {
+                0 => bytes.truncate(at.max(200)),
+                1 => drop(bytes.drain(at..(at + 2).min(bytes.len()))),
+                2 => bytes[at] = 0xFF,
+                3 => bytes[at] ^= 1 << stream.below(8),
+                4 => bytes[at] = b'9',
+                _ => bytes[at] = stream.next_u32() as u8,
+            }
+        }
+        std::fs::write(path, &bytes).expect("writable");
+        let options = ReadOptions { resample: round % 2 == 0, ..options };
+        match read(folder.path(), &options) {
+            Ok(loaded) => {
+                n_read += 1;
+                assert!(loaded.volume.grid().n_voxels() <= 1 << 19);
+            }
+            Err(Error::Read { problem, .. }) => {
+                n_refused += 1;
+                assert!(!matches!(problem, ReadError::Io(_)), "{problem} is no fault of the disk");
+            }
+            Err(error) => panic!("{error}"),
+        }
+        std::fs::write(path, original).expect("writable");
+    }
+    assert!(n_read > 100 && n_refused > 100, "{n_read} read, {n_refused} refused: too one-sided");
+}
