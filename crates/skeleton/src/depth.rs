@@ -15,7 +15,7 @@ use std::ops::Range;
 
 use espalier_model::Bits;
 
-use crate::lattice::{Lattice, WORD};
+use crate::lattice::{Lattice, WORD, ones};
 
 /// Depth units in the smallest spacing.
 pub(crate) const UNITS_PER_SPACING: f64 = 30.0;
@@ -43,6 +43,25 @@ impl Depths {
         };
         let words = lattice.bits().words().iter().map(rank).collect();
         Self { words, depths: chamfer(lattice) }
+    }
+
+    /// The cells by level, from the shallowest, as words and bits in raster order: level i holds the depths from
+    /// i · `step`, without it, to (i + 1) · `step`.
+    pub(crate) fn levels(&self, step: u16) -> Vec<Vec<(usize, u64)>> {
+        let mut levels: Vec<Vec<(usize, u64)>> = Vec::new();
+        for (word, &(bits, before)) in self.words.iter().enumerate().filter(|(_, (bits, _))| *bits != 0) {
+            for (bit, &depth) in ones(bits).zip(&self.depths[before..]) {
+                let level = usize::from((depth.max(1) - 1) / step);
+                if level >= levels.len() {
+                    levels.resize(level + 1, Vec::new());
+                }
+                match levels[level].last_mut() {
+                    Some((last, bits)) if *last == word => *bits |= 1 << bit,
+                    _ => levels[level].push((word, 1 << bit)),
+                }
+            }
+        }
+        levels
     }
 
     /// The depth of a cell; 0 for background.

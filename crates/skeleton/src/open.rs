@@ -34,17 +34,6 @@ impl Direction {
     }
 }
 
-/// What is said of a voxel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Answer {
-    /// It may go, with this neighbourhood; it is asked about again.
-    Goes(u32),
-    /// It stays until its neighbourhood changes.
-    Stays,
-    /// It stays until it is released.
-    Waits,
-}
-
 /// The voxels at work.
 pub(crate) struct Open {
     /// One bit a cell.
@@ -57,18 +46,22 @@ pub(crate) struct Open {
 }
 
 impl Open {
-    /// All border voxels are open.
-    pub(crate) fn border(lattice: &Lattice) -> Self {
+    /// No voxel is open; all are held.
+    pub(crate) fn held(lattice: &Lattice) -> Self {
         let words = lattice.bits().words();
-        let n_blocks = words.len().div_ceil(WORD);
-        let mut open = Self {
+        Self {
             bits: vec![0; words.len()],
-            active: vec![0; n_blocks],
-            held: vec![0; words.len()],
+            active: vec![0; words.len().div_ceil(WORD)],
+            held: words.to_vec(),
             directions: Direction::all(lattice),
-        };
-        for (word, &foreground) in words.iter().enumerate().filter(|&(_, &bits)| bits != 0) {
-            open.add(word, foreground & open.border_of(words, word));
+        }
+    }
+
+    /// All border voxels are open; none is held.
+    pub(crate) fn border(lattice: &Lattice) -> Self {
+        let mut open = Self::held(lattice);
+        for (word, &bits) in lattice.bits().words().iter().enumerate().filter(|&(_, &bits)| bits != 0) {
+            open.release(lattice, word, bits);
         }
         open
     }
@@ -79,7 +72,7 @@ impl Open {
     }
 
     /// Opens bits of a word.
-    pub(crate) fn add(&mut self, word: usize, bits: u64) {
+    fn add(&mut self, word: usize, bits: u64) {
         if bits & !self.bits[word] != 0 {
             self.bits[word] |= bits;
             self.active[word / WORD] |= 1 << (word % WORD);
@@ -100,18 +93,20 @@ impl Open {
         }
     }
 
-    /// Opens a held cell.
-    pub(crate) fn release(&mut self, cell: usize) {
-        self.held[cell / WORD] &= !(1 << (cell % WORD));
-        self.add(cell / WORD, 1 << (cell % WORD));
+    /// Holds bits of a word no longer, and opens those that are border.
+    pub(crate) fn release(&mut self, lattice: &Lattice, word: usize, bits: u64) {
+        let words = lattice.bits().words();
+        self.held[word] &= !bits;
+        self.add(word, bits & words[word] & self.border_of(words, word));
     }
 
-    /// Asks about each open voxel with background in `direction`, in raster order.
+    /// Asks `qualifies` about each open voxel with background in `direction`, in raster order; one that is refused
+    /// is open no longer.
     pub(crate) fn ask(
         &mut self,
         lattice: &Lattice,
         direction: Direction,
-        mut answer: impl FnMut(usize) -> Answer,
+        mut qualifies: impl FnMut(usize) -> bool,
     ) {
         let words = lattice.bits().words();
         for block in 0..self.active.len() {
@@ -124,9 +119,7 @@ impl Open {
                     open &= self.border_of(words, word);
                 }
                 for bit in ones(candidates) {
-                    let answer = answer(word * WORD + bit);
-                    open &= !(u64::from(!matches!(answer, Answer::Goes(_))) << bit);
-                    self.held[word] |= u64::from(answer == Answer::Waits) << bit;
+                    open &= !(u64::from(!qualifies(word * WORD + bit)) << bit);
                 }
                 self.bits[word] = open;
                 if open == 0 {

@@ -16,7 +16,7 @@
 
 use crate::euler::EulerTable;
 use crate::lattice::Lattice;
-use crate::open::{Answer, Direction, Open};
+use crate::open::{Direction, Open};
 use crate::params::Thinning;
 use crate::safe;
 use crate::simple::{is_endpoint, is_simple};
@@ -26,7 +26,7 @@ pub(crate) fn thin(lattice: &mut Lattice, thinning: Thinning) -> usize {
     match thinning {
         Thinning::Lee94 => {
             let mut open = Open::border(lattice);
-            sweep_until_stable(lattice, &mut open, &mut Lee94 { euler: EulerTable::get() })
+            sweep_until_stable(lattice, &mut open, &Lee94 { euler: EulerTable::get() })
         }
         Thinning::Safe => safe::thin(lattice),
     }
@@ -35,7 +35,7 @@ pub(crate) fn thin(lattice: &mut Lattice, thinning: Thinning) -> usize {
 /// What may be deleted.
 pub(crate) trait Rule {
     /// Whether the frozen volume lets a voxel go.
-    fn collects(&mut self, lattice: &Lattice, cell: usize) -> Answer;
+    fn collects(&self, lattice: &Lattice, cell: usize, neighborhood: u32) -> bool;
 
     /// Whether the live volume lets a collected voxel go, whose neighbourhood was `frozen` and is `live`.
     fn deletes(&self, lattice: &Lattice, cell: usize, frozen: u32, live: u32) -> bool;
@@ -47,11 +47,8 @@ struct Lee94 {
 }
 
 impl Rule for Lee94 {
-    fn collects(&mut self, lattice: &Lattice, cell: usize) -> Answer {
-        let neighborhood = lattice.neighborhood(cell);
-        let goes =
-            !is_endpoint(neighborhood) && self.euler.is_invariant(neighborhood) && is_simple(neighborhood);
-        if goes { Answer::Goes(neighborhood) } else { Answer::Stays }
+    fn collects(&self, _: &Lattice, _: usize, neighborhood: u32) -> bool {
+        !is_endpoint(neighborhood) && self.euler.is_invariant(neighborhood) && is_simple(neighborhood)
     }
 
     /// The recheck asks for simplicity alone, as published.
@@ -61,7 +58,7 @@ impl Rule for Lee94 {
 }
 
 /// Repeats the six sub-iterations until none of them deletes a voxel; returns the number of sweeps.
-pub(crate) fn sweep_until_stable(lattice: &mut Lattice, open: &mut Open, rule: &mut impl Rule) -> usize {
+pub(crate) fn sweep_until_stable(lattice: &mut Lattice, open: &mut Open, rule: &impl Rule) -> usize {
     let mut collected = Vec::new();
     let mut n_sweeps = 0;
     loop {
@@ -82,16 +79,17 @@ fn collect(
     lattice: &Lattice,
     open: &mut Open,
     direction: Direction,
-    rule: &mut impl Rule,
+    rule: &impl Rule,
     collected: &mut Vec<(usize, u32)>,
 ) {
     collected.clear();
     open.ask(lattice, direction, |cell| {
-        let answer = rule.collects(lattice, cell);
-        if let Answer::Goes(neighborhood) = answer {
+        let neighborhood = lattice.neighborhood(cell);
+        let is_collected = rule.collects(lattice, cell, neighborhood);
+        if is_collected {
             collected.push((cell, neighborhood));
         }
-        answer
+        is_collected
     });
 }
 
