@@ -7,6 +7,8 @@ use std::fs;
 use std::path::Path;
 use std::process::ExitCode;
 
+use espalier_model::Diagnose;
+use espalier_model::diagnose::Class;
 use espalier_pipeline::Error;
 use espalier_tests::degenerate::cases;
 use espalier_tests::{results, run, set};
@@ -35,20 +37,19 @@ fn main() -> ExitCode {
 fn report(name: &str, swc: &str) -> std::io::Result<()> {
     let folder = Path::new(FOLDER).join(name.replace([' ', ','], "-"));
     fs::create_dir_all(&folder)?;
+    let folder = fs::canonicalize(folder)?;
     let file = folder.join("traced.swc");
     fs::write(&file, swc)?;
     let out = folder.join("run");
-    let outcome = run(&file, &out, &[set("input.unit", "mm")], 2);
+    let refused = run(&file, &out, &[set("input.unit", "mm")], 2).err();
+    if let Some(error) = refused.as_ref().filter(|error| error.class() == Class::Io) {
+        return Err(std::io::Error::other(error.to_string()));
+    }
     let seconds = seconds(&out);
     let cells: Vec<String> =
         seconds.iter().map(|s| s.map_or_else(|| "n/a".to_owned(), |s| format!("{s:.2}"))).collect();
-    let total: f64 = seconds.iter().flatten().sum();
-    println!(
-        "{name}\t{}\t{}\t{total:.2}\t{}",
-        swc.lines().count(),
-        cells.join("\t"),
-        verdict(&out, outcome.err())
-    );
+    let total = seconds.iter().flatten().fold(0.0, |sum, s| sum + s);
+    println!("{name}\t{}\t{}\t{total:.2}\t{}", swc.lines().count(), cells.join("\t"), verdict(&out, refused));
     Ok(())
 }
 

@@ -31,6 +31,8 @@ pub(crate) const SAMPLES: usize = 3;
 pub(crate) const TILE: usize = 32;
 /// The most samples per tile and axis.
 pub(crate) const TILE_SAMPLES: usize = TILE * SAMPLES;
+/// Beyond this mean over the tiles that are not empty nobody can see what blends with what.
+const PLAIN_LAYERS: f64 = 16.0;
 /// What an edge of a few pixels may take, in pixels, without being counted: however many they are, they must be drawn.
 const SLENDER_PX: f64 = 256.0;
 /// No edge.
@@ -125,6 +127,8 @@ fn tiles_of(size: [usize; 2], edge: &Drawn) -> [RangeInclusive<usize>; 2] {
 pub(crate) fn rasterise(job: &Job<'_>) -> Vec<Pixel> {
     let [width, height] = job.size;
     let tiles = Tiles::sort(job);
+    let n_layers = tiles.layers(job);
+    let is_plain = is_plain(&n_layers);
     let mut pixels = vec![Pixel::EMPTY; width * height];
     pixels.par_chunks_mut(width * TILE).enumerate().for_each(|(tile_y, band)| {
         let mut samples = Samples::new();
@@ -134,7 +138,8 @@ pub(crate) fn rasterise(job: &Job<'_>) -> Vec<Pixel> {
                 continue;
             }
             let origin = Vec2::new((tile_x * TILE) as f32, (tile_y * TILE) as f32);
-            samples.draw(job, list, origin, detail(job, list, origin));
+            let detail = Detail::for_layers(n_layers[tile_y * tiles.n_x + tile_x], is_plain);
+            samples.draw(job, list, origin, detail);
             let columns = tile_x * TILE..((tile_x + 1) * TILE).min(width);
             for (row, line) in band.chunks_mut(width).enumerate() {
                 for (column, pixel) in line[columns.clone()].iter_mut().enumerate() {
@@ -146,11 +151,11 @@ pub(crate) fn rasterise(job: &Job<'_>) -> Vec<Pixel> {
     pixels
 }
 
-/// How carefully a tile can be drawn: where ten thousand branches leave one root, all are in the tiles around it.
-fn detail(job: &Job<'_>, list: &[u32], origin: Vec2) -> Detail {
-    let corners = (origin, origin + TILE as f32);
-    let area = |&index: &u32| job.drawn[index as usize].cone.area_within(corners, GAP_PX);
-    Detail::for_layers(list.iter().map(area).sum::<f64>() / (TILE * TILE) as f64)
+/// Whether most of the picture is too crowded for blending: all of it then goes without, for a tile that does not blend
+/// looks otherwise than its neighbour that does.
+fn is_plain(n_layers: &[f64]) -> bool {
+    let n_drawn = n_layers.iter().filter(|&&n| n > 0.0).count().max(1);
+    n_layers.iter().sum::<f64>() / n_drawn as f64 > PLAIN_LAYERS
 }
 
 /// Which edges touch which tile.
@@ -187,6 +192,19 @@ impl Tiles {
             });
         }
         Self { n_x, offsets, entries }
+    }
+
+    /// By tile: about how often its cones cover it. Where ten thousand branches leave one root, all are in the tiles
+    /// around it.
+    fn layers(&self, job: &Job<'_>) -> Vec<f64> {
+        let of_tile = |tile: usize| {
+            let (tile_x, tile_y) = (tile % self.n_x, tile / self.n_x);
+            let low = Vec2::new((tile_x * TILE) as f32, (tile_y * TILE) as f32);
+            let corners = (low, low + TILE as f32);
+            let area = |&index: &u32| job.drawn[index as usize].cone.area_within(corners, GAP_PX);
+            self.list(tile_x, tile_y).iter().map(area).sum::<f64>() / (TILE * TILE) as f64
+        };
+        (0..self.offsets.len() - 1).into_par_iter().map(of_tile).collect()
     }
 
     fn list(&self, tile_x: usize, tile_y: usize) -> &[u32] {

@@ -16,8 +16,6 @@ use crate::shade::{self, Place};
 /// Tiles that cones cover more often than this get one sample a pixel. Organs at their true widths stay below: no
 /// pixel of the airway, vessel and neuron phantoms' pictures changes by it.
 const FINE_LAYERS: f64 = 12.0;
-/// Beyond this nobody can see what blends with what.
-const COARSE_LAYERS: f64 = 24.0;
 /// Cones that end lower than this share of the radius below the highest have no say in the normal.
 const BLEND_SHARE: f32 = 0.7;
 /// Two cones blend if the path between them is at most this many of their radii.
@@ -89,12 +87,14 @@ pub(crate) enum Detail {
 }
 
 impl Detail {
-    /// For a tile whose cones cover it so many times over.
-    pub(crate) fn for_layers(n_layers: f64) -> Self {
-        match n_layers {
-            n if n <= FINE_LAYERS => Self::Fine,
-            n if n <= COARSE_LAYERS => Self::Coarse,
-            _ => Self::Plain,
+    /// For a tile that cones cover so many times over, in a picture that blends or not.
+    pub(crate) fn for_layers(n_layers: f64, is_plain: bool) -> Self {
+        if is_plain {
+            Self::Plain
+        } else if n_layers <= FINE_LAYERS {
+            Self::Fine
+        } else {
+            Self::Coarse
         }
     }
 
