@@ -88,7 +88,7 @@ pub(crate) enum Command {
     Skeleton(StageArguments),
     /// Inscribed spheres:  espalier radius MASK SKELETON -o DIR
     Radius(StageArguments),
-    /// One rooted tree:  espalier tree MASK SKELETON SPHERES -o DIR, or espalier tree TRACED.swc -o DIR
+    /// One rooted tree:  espalier tree MASK SKELETON SPHERES -o DIR, or espalier tree TRACED.swc -o DIR (or .vtp, .vtk)
     Tree(StageArguments),
     /// Views and local planes:  espalier views TREE -o DIR
     Views(StageArguments),
@@ -104,7 +104,7 @@ pub(crate) enum Command {
 #[derive(Debug, Args)]
 pub(crate) struct RunArguments {
     /// A config (.toml), or an input: a volume (.nii, .nii.gz, .hdr, .nrrd, .nhdr, .mha, .mhd, a folder of
-    /// DICOM slices) or a traced tree (.swc)
+    /// DICOM slices) or a traced tree (.swc, .vtp, .vtk)
     pub(crate) config_or_input: PathBuf,
     /// The run folder [default: out/NAME]
     #[arg(short, long, value_name = "DIR")]
@@ -157,7 +157,7 @@ Examples:
 #[command(after_help = SWEEP_HELP)]
 pub(crate) struct SweepArguments {
     /// A config (.toml), or an input: a volume (.nii, .nii.gz, .hdr, .nrrd, .nhdr, .mha, .mhd, a folder of
-    /// DICOM slices) or a traced tree (.swc)
+    /// DICOM slices) or a traced tree (.swc, .vtp, .vtk)
     pub(crate) config_or_input: PathBuf,
     /// A key and its values; may be given many times, for all combinations
     #[arg(long = "over", value_name = "KEY=V1,V2,…", required = true, value_parser = parse_axis)]

@@ -28,6 +28,7 @@ mod grid;
 mod ledger;
 mod mask;
 pub mod nifti_out;
+pub mod polydata;
 mod report;
 mod skeleton;
 mod spheres;

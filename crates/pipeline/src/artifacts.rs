@@ -6,6 +6,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use espalier_model::polydata;
 use espalier_model::swc::{self, Traced};
 use espalier_model::{
     Comparison, Diagnose, Edits, Embedding, InscribedSpheres, Ledger, Mask, Report, Skeleton, Tree,
@@ -80,10 +81,22 @@ impl Artifacts {
         }
         let path = self.locate(Artifact::Traced, lookup)?;
         let bytes = self.read_bounded(&path)?;
-        let scale = self.input.traced_scale(swc::is_own(&bytes));
-        self.is_unit_guessed =
-            self.input.unit == Unit::Auto && self.input.scale == [1.0; 3] && !swc::is_own(&bytes);
-        let (traced, report) = swc::parse(&bytes, &scale).map_err(|error| Error::file(&path, error))?;
+        let is_polydata = polydata::is_polydata(&bytes);
+        // What states no unit is in µm, but for our own files and those of VTK.
+        let is_mm = is_polydata || swc::is_own(&bytes);
+        let scale = self.input.traced_scale(is_mm);
+        self.is_unit_guessed = self.input.unit == Unit::Auto && self.input.scale == [1.0; 3] && !is_mm;
+        let (traced, report) = if is_polydata {
+            let assumed = self.input.assume_space.map(espalier_volume::AssumedSpace::ras_signs);
+            let parsed =
+                polydata::parse(&bytes, &scale, assumed).map_err(|error| Error::file(&path, error))?;
+            let (traced, joined) = espalier_tree::join_lines(&parsed.0);
+            let mut report = parsed.1;
+            report.extend(joined);
+            (traced, report)
+        } else {
+            swc::parse(&bytes, &scale).map_err(|error| Error::file(&path, error))?
+        };
         let traced = Arc::new(traced);
         self.traced = Some(Arc::clone(&traced));
         Ok((traced, report))

@@ -304,7 +304,7 @@ impl Diagnose for Error {
                 "check the path; a path in a config is relative to the config's own folder".to_owned()
             }
             Self::Read { source, .. } if source.kind() == io::ErrorKind::IsADirectory => {
-                "name a file: a config (.toml), a volume (.nii, .nii.gz, .hdr, .nrrd, .nhdr, .mha, .mhd) or a traced tree (.swc)".to_owned()
+                "name a file: a config (.toml), a volume (.nii, .nii.gz, .hdr, .nrrd, .nhdr, .mha, .mhd) or a traced tree (.swc, .vtp, .vtk)".to_owned()
             }
             Self::OtherSettings { difference, .. } => {
                 format!("run with --from {}, or set {} back", difference.stage, difference.key)

@@ -46,6 +46,7 @@ mod mask_walk;
 mod merge;
 mod outline;
 mod params;
+mod polylines;
 mod prune;
 mod redundant;
 mod resample;
@@ -61,6 +62,7 @@ use glam::DVec3;
 
 pub use error::Error;
 pub use params::{Components, Loops, MissingRadii, Params, Resample, Root, Roots, Tips};
+pub use polylines::join_lines;
 
 /// Branches shorter than this share of the smallest spacing are shorter than voxels can tell.
 const RESOLUTION: f64 = 0.2;

@@ -161,6 +161,14 @@ fn scaling(keys: &Keys, report: &mut Report) -> Result<(f64, f64), ReadError> {
         report.warn("W-META-SLOPE", "ElementToIntensityFunctionSlope is 0: the numbers are taken unscaled");
         return Ok((1.0, 0.0));
     }
+    if (slope, intercept) != (1.0, 0.0) {
+        report.warn(
+            "W-META-SLOPE",
+            format!(
+                "values are scaled by {slope} and {intercept} as the header says; ITK takes them unscaled"
+            ),
+        );
+    }
     Ok((slope, intercept))
 }
 
@@ -195,6 +203,9 @@ fn world_from_voxel(
         (None, Some(name)) => text::unit_mm(name).unwrap_or(1.0),
         (None, None) => 1.0,
     };
+    if options.unit_mm.is_none() && unit_mm != 1.0 {
+        report.warn("W-META-UNITS", "lengths are in DistanceUnits as the header says; ITK takes them for mm");
+    }
     let ras_mm = AssumedSpace::Lps.ras_signs() * unit_mm;
     let ras_from_voxel = DMat3::from_diagonal(ras_mm) * lps_from_voxel;
     warn_if_orientation_disagrees(keys, ras_from_voxel, report);

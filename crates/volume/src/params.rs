@@ -58,7 +58,8 @@ pub enum AssumedSpace {
 
 impl AssumedSpace {
     /// For each axis 1 where it points along R, A or S, -1 where it points against it.
-    pub(crate) fn ras_signs(self) -> DVec3 {
+    #[must_use]
+    pub fn ras_signs(self) -> DVec3 {
         match self {
             Self::Ras => DVec3::new(1.0, 1.0, 1.0),
             Self::Las => DVec3::new(-1.0, 1.0, 1.0),

@@ -187,6 +187,11 @@ impl ReadError {
             other => other,
         }
     }
+
+    /// Whether there are fewer bytes than there should be.
+    pub(crate) fn is_truncated(&self) -> bool {
+        matches!(self.innermost(), Self::Truncated { .. })
+    }
 }
 
 impl From<DicomError> for ReadError {

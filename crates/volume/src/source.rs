@@ -125,9 +125,12 @@ impl Source {
         let taken = self.ahead.position() as usize;
         while self.ahead.get_ref().len() - taken < n_bytes {
             let mut more = vec![0_u8; n_bytes - (self.ahead.get_ref().len() - taken)];
-            match self.read_on(&mut more)? {
-                0 => break,
-                n_read => self.ahead.get_mut().extend_from_slice(&more[..n_read]),
+            match self.read_on(&mut more) {
+                // What is cut short is told where it is missed.
+                Err(error) if error.is_truncated() && self.ahead.get_ref().len() > taken => break,
+                Err(error) => return Err(error),
+                Ok(0) => break,
+                Ok(n_read) => self.ahead.get_mut().extend_from_slice(&more[..n_read]),
             }
         }
         let ahead = &self.ahead.get_ref()[taken..];

@@ -14,12 +14,12 @@ const DATA_VARIABLE: &str = "$ESPALIER_DATA";
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum InputKind {
-    /// By its name: `.swc` is a tree, all else a volume.
+    /// By its name: `.swc`, `.vtp` and `.vtk` are trees, all else a volume.
     #[default]
     Auto,
     /// A volume: CT, label map or mask; `[volume]` says how it becomes a mask.
     Volume,
-    /// A traced tree.
+    /// A traced tree: SWC, or polylines of VTK.
     Tree,
 }
 
@@ -27,7 +27,7 @@ pub enum InputKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Unit {
-    /// By the header of a volume; µm for a traced tree, mm if espalier wrote it.
+    /// By the header of a volume; µm for a traced tree, mm if espalier wrote it or if it is of VTK.
     #[default]
     Auto,
     /// Millimetres.
@@ -55,7 +55,8 @@ impl Unit {
 #[serde(default, deny_unknown_fields)]
 pub struct Input {
     /// A volume (NIfTI, NRRD, MetaImage: `.nii`, `.nii.gz`, `.hdr`, `.nrrd`, `.nhdr`, `.mha`, `.mhd`; a folder of
-    /// DICOM slices, or one of them) or a traced tree (`.swc`). Relative to the config's folder; `$ESPALIER_DATA` at its beginning is expanded.
+    /// DICOM slices, or one of them) or a traced tree (`.swc`, `.vtp`, `.vtk`). Relative to the config's folder;
+    /// `$ESPALIER_DATA` at its beginning is expanded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub path: Option<String>,
     /// Instead of a file: the phantom to make; `[phantom]` has its shape.
@@ -73,13 +74,13 @@ pub struct Input {
     /// false: they are refused with the reason.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub resample: bool,
-    /// What to make of a volume whose header does not say where it lies.
+    /// The space of a volume or of polylines whose file does not name it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub assume_space: Option<espalier_volume::AssumedSpace>,
     /// Refuse what would otherwise be repaired with a warning. Default false.
     pub strict: bool,
     /// The unit of the input's coordinates. Default `auto`: by the header of a volume; µm for a
-    /// traced tree, mm if espalier wrote it.
+    /// traced tree, mm if espalier wrote it or if it is of VTK.
     pub unit: Unit,
     /// How many units a step in x, y, z of a traced tree is. Default 1, 1, 1; for files in pixels and slices.
     pub scale: [f64; 3],
@@ -191,11 +192,13 @@ impl Input {
     #[must_use]
     pub fn is_traced(&self) -> bool {
         let written = Path::new(self.path.as_deref().unwrap_or_default());
-        let is_swc = written.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("swc"));
+        let is_tree = written.extension().is_some_and(|extension| {
+            ["swc", "vtp", "vtk"].iter().any(|known| extension.eq_ignore_ascii_case(known))
+        });
         match self.kind {
             InputKind::Tree => true,
             InputKind::Volume => false,
-            InputKind::Auto => is_swc || self.phantom == Some(espalier_phantom::Kind::Neuron),
+            InputKind::Auto => is_tree || self.phantom == Some(espalier_phantom::Kind::Neuron),
         }
     }
 }
