@@ -9,6 +9,7 @@ const EXAMPLES: &str = "\
 Examples:
   espalier run pipelines/airway.toml                    the embedded phantom, from CT to picture
   espalier run neuron.swc -o out/neuron                 a traced tree, every setting at its default
+  espalier run chest-ct.nii.gz --preset airway          airways, from the trachea to before the leak
   espalier run scan.nii.gz --set volume.method=region-grow \\
       --set volume.upper=-865 --set 'volume.seed_voxel=[58,80,85]'
   espalier run dicom/ --series 2 --set volume.method=threshold --set volume.lower=200
@@ -43,6 +44,13 @@ pub(crate) struct Common {
     /// Change a config key, such as embed.w_angle=3; may be given many times
     #[arg(long = "set", value_name = "KEY=VALUE", global = true, value_parser = parse_override)]
     pub(crate) overrides: Vec<Override>,
+    /// What a scan shows: airway (grown from the trachea, which is found) or vessel (with contrast); short for
+    /// --set volume.preset, and for airway --set tree.root=superior
+    #[arg(long, global = true, value_name = "airway|vessel", value_parser = ["airway", "vessel"])]
+    pub(crate) preset: Option<String>,
+    /// The organ in a label map, by value or name, several with commas; short for --set volume.label
+    #[arg(long, global = true, value_name = "LABEL")]
+    pub(crate) label: Option<String>,
     /// Which DICOM series of a folder, from 1 as the message lists them; the same as --set input.series=N
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) series: Option<u32>,
@@ -61,12 +69,20 @@ pub(crate) struct Common {
 }
 
 impl Arguments {
-    /// Adds the keys that have an option of their own to those of `--set`.
+    /// Adds the keys that have an option of their own to those of `--set`: a preset before them, so that they have
+    /// the last word, the others after.
     pub(crate) fn with_all_overrides(mut self) -> Self {
         let set = |key: &str, value: String| Override { key: key.to_owned(), value };
-        let series = self.common.series.map(|index| set("input.series", index.to_string()));
-        let resample = self.common.resample.then(|| set("input.resample", "true".to_owned()));
-        self.common.overrides.extend(series.into_iter().chain(resample));
+        let common = &mut self.common;
+        let root = common.preset.as_ref().filter(|preset| *preset == "airway");
+        let root = root.map(|_| set("tree.root", "superior".to_owned()));
+        let preset = common.preset.take().map(|preset| set("volume.preset", preset));
+        common.overrides.splice(..0, preset.into_iter().chain(root));
+        // Quoted, so that numbers with commas stay one value.
+        let label = common.label.take().map(|label| set("volume.label", format!("{label:?}")));
+        let series = common.series.map(|index| set("input.series", index.to_string()));
+        let resample = common.resample.then(|| set("input.resample", "true".to_owned()));
+        common.overrides.extend(label.into_iter().chain(series).chain(resample));
         self
     }
 }

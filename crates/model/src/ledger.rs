@@ -11,6 +11,8 @@ use crate::table::{Column, Table, fixed};
 pub enum LedgerKind {
     /// A connected component that is not part of the tree.
     ComponentDropped,
+    /// A tunnel of the mask closed by changing a few voxels.
+    TunnelClosed,
     /// An edge removed to open a loop.
     LoopCut,
     /// A short terminal branch removed.
@@ -26,8 +28,9 @@ pub enum LedgerKind {
 }
 
 impl LedgerKind {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 8] = [
         Self::ComponentDropped,
+        Self::TunnelClosed,
         Self::LoopCut,
         Self::SpurPruned,
         Self::TipExtended,
@@ -41,6 +44,7 @@ impl LedgerKind {
     pub fn name(self) -> &'static str {
         match self {
             Self::ComponentDropped => "component_dropped",
+            Self::TunnelClosed => "tunnel_closed",
             Self::LoopCut => "loop_cut",
             Self::SpurPruned => "spur_pruned",
             Self::TipExtended => "tip_extended",

@@ -17,6 +17,8 @@ pub(crate) fn text() -> String {
         ("topology.tsv", &LEDGER_COLUMNS),
         ("spheres.tsv", &SPHERE_COLUMNS),
         ("dropped.tsv", &LEDGER_COLUMNS),
+        ("growth.tsv", &espalier_volume::GROWTH_COLUMNS),
+        ("seeds.tsv", &espalier_volume::SEED_COLUMNS),
         ("convergence.tsv", &CONVERGENCE_COLUMNS),
         ("provenance/inputs.tsv", &INPUT_COLUMNS),
         ("provenance/timings.tsv", &TIMING_COLUMNS),

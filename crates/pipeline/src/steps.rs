@@ -95,11 +95,23 @@ fn volume(step: &mut Step<'_>) -> Result<Outcome, Error> {
     if n_dropped > 0.0 {
         line = format!("{line}; {n_dropped} components dropped");
     }
+    if let Some((stable, leaking)) = segmented.growth.as_ref().and_then(espalier_volume::Growth::leak) {
+        line = format!("{line}; it leaks at {}, {} is the last before", leaking.threshold, stable.threshold);
+    }
     let report = segmented.report;
-    let files = vec![
+    if let Some(left) = report.get("tunnels_left") {
+        line = format!("{line}; {} tunnels, {left} left", report.get("tunnels").unwrap_or(left));
+    }
+    let mut files = vec![
         step.place(Artifact::Mask, nifti_out::mask(&mask).map_err(|error| step.failed(error))?),
         step.beside("dropped.tsv", dropped.into_bytes()),
     ];
+    if let Some(growth) = &segmented.growth {
+        files.push(step.beside("growth.tsv", growth.to_tsv().into_bytes()));
+    }
+    if !segmented.seeds.is_empty() {
+        files.push(step.beside("seeds.tsv", espalier_volume::seeds_to_tsv(&segmented.seeds).into_bytes()));
+    }
     step.artifacts.mask = Some(Arc::new(mask));
     Ok(Outcome { files, report, line })
 }

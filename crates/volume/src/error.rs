@@ -69,6 +69,56 @@ pub enum Error {
         /// How far away that is.
         distance_mm: f64,
     },
+    /// A label's name is none that is known.
+    #[error("no label is called {name}; the nearest names are {nearest}; the volume holds {holds}")]
+    UnknownLabel {
+        /// The name.
+        name: String,
+        /// Known names like it.
+        nearest: String,
+        /// The volume's values.
+        holds: String,
+    },
+    /// A label's name is known, but the volume has no such value, or others that the task has not.
+    #[error(
+        "the label {name} is {value} in TotalSegmentator's task {task}, but the volume is none of it: it holds {holds}"
+    )]
+    AbsentLabel {
+        /// The name.
+        name: String,
+        /// Its number.
+        value: f64,
+        /// The task that has it.
+        task: &'static str,
+        /// The volume's values.
+        holds: String,
+    },
+    /// A label by name, of a volume that is no label map.
+    #[error("the volume is no label map: it holds values from {min} to {max}, none of which can be {label}")]
+    NoLabelMap {
+        /// The label.
+        label: String,
+        /// The smallest finite value.
+        min: f64,
+        /// The largest finite value.
+        max: f64,
+    },
+    /// No seed is given and no trachea is found.
+    #[error(
+        "no trachea found: no stack of round, walled air in the axial slices; the volume's values go from {min} to {max}"
+    )]
+    NoTrachea {
+        /// The smallest finite value; NaN if there is none.
+        min: f64,
+        /// The largest finite value; NaN if there is none.
+        max: f64,
+    },
+    /// The region grows with the threshold all the way.
+    #[error("the region about the seed grows all the way with the threshold, so where it leaks cannot be told: {}", .curve.map(|(threshold, ml)| format!("{ml:.1} ml at {threshold}")).join(", "))]
+    NoKnee {
+        /// Threshold and volume in ml at five levels.
+        curve: [(f64, f64); 5],
+    },
 }
 
 impl Diagnose for Error {
@@ -80,6 +130,11 @@ impl Diagnose for Error {
             Self::Empty { .. } => "E-VOLUME-EMPTY",
             Self::SeedOutside { .. } => "E-VOLUME-SEED-OUTSIDE",
             Self::SeedOutOfBand { .. } => "E-VOLUME-SEED-BAND",
+            Self::UnknownLabel { .. } => "E-VOLUME-LABEL-UNKNOWN",
+            Self::AbsentLabel { .. } => "E-VOLUME-LABEL-ABSENT",
+            Self::NoLabelMap { .. } => "E-VOLUME-NO-LABELS",
+            Self::NoTrachea { .. } => "E-VOLUME-NO-TRACHEA",
+            Self::NoKnee { .. } => "E-VOLUME-NO-KNEE",
         }
     }
 
@@ -87,8 +142,12 @@ impl Diagnose for Error {
         match self {
             Self::Read { problem, .. } => problem.class(),
             Self::Param(error) => error.class(),
-            Self::MethodNeeded { .. } | Self::SeedOutside { .. } | Self::SeedOutOfBand { .. } => Class::Usage,
-            Self::Empty { .. } => Class::Input,
+            Self::MethodNeeded { .. }
+            | Self::UnknownLabel { .. }
+            | Self::SeedOutside { .. }
+            | Self::SeedOutOfBand { .. } => Class::Usage,
+            Self::AbsentLabel { .. } | Self::NoLabelMap { .. } => Class::Input,
+            Self::Empty { .. } | Self::NoTrachea { .. } | Self::NoKnee { .. } => Class::Input,
         }
     }
 
@@ -100,6 +159,21 @@ impl Diagnose for Error {
             Self::Empty { .. } => "check the file, or choose another band or label".to_owned(),
             Self::SeedOutside { .. } => {
                 "voxels count from 0 on the file's own axes; points are RAS+ mm".to_owned()
+            }
+            Self::UnknownLabel { .. } | Self::AbsentLabel { .. } => {
+                "set volume.label to one of the values, which always works".to_owned()
+            }
+            Self::NoLabelMap { .. } => "set volume.preset or volume.method for a scan".to_owned(),
+            Self::NoTrachea { min, .. } if *min > -500.0 => {
+                "nothing is as dark as air: the values are no HU (the intercept of the scan may be missing), or the scan \
+                 shows no lung; set volume.seed_voxel and volume.upper"
+                    .to_owned()
+            }
+            Self::NoTrachea { .. } => {
+                "set volume.seed_voxel = [x, y, z] (or volume.seed_mm, RAS+) to a voxel inside the trachea".to_owned()
+            }
+            Self::NoKnee { .. } => {
+                "set volume.upper (airways) or volume.lower (vessels), or another volume.seed_voxel".to_owned()
             }
             Self::SeedOutOfBand { nearest: [x, y, z], .. } => {
                 format!("set seed_voxel = [{x}, {y}, {z}] if that is the organ, or widen the band")

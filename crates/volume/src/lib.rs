@@ -13,10 +13,13 @@
 //! | **[`read`]**: file → [`Volume`](espalier_model::Volume) | `read` |
 //! | what a volume is: mask, labels, CT | `kind` |
 //! | mask, label, threshold band | `select`, `choose` |
+//! | labels by name | `labels` |
 //! | region growing from a seed | `region_grow` |
+//! | where a region leaks | `growth` |
+//! | where the trachea is | `trachea` |
 //! | connected components by runs of voxels | `runs`, `components` |
 //! | cavities filled | `cavities` |
-//! | tunnels counted | `euler` |
+//! | tunnels counted, and closed where they are faults | `euler`, `heal` |
 //! | **[`segment`]**: `Volume` → [`Mask`](espalier_model::Mask) | `segment` |
 //! | **[`read_mask`]**: file → `Mask`, without holding the volume where values alone decide | `read_mask`, `stream` |
 //!
@@ -45,16 +48,20 @@ mod orthogonal;
 mod read;
 
 mod choose;
+mod growth;
 mod kind;
+mod labels;
 mod region_grow;
 mod runs;
 mod select;
+mod trachea;
 
 mod cavities;
 mod components;
 mod euler;
 #[cfg(test)]
 mod flood;
+mod heal;
 mod segment;
 
 mod read_mask;
@@ -67,9 +74,12 @@ mod read_error;
 pub use dicom::{DicomError, Irregularity, Listed, Obstacle};
 pub use error::Error;
 pub use euler::euler_number;
+pub use growth::{GROWTH_COLUMNS, Growth, Knee, Level, Towards};
 pub use kind::{Kind, inspect_kind};
-pub use params::{AssumedSpace, Components, Method, Params, ReadOptions};
+pub use labels::{Label, Labels};
+pub use params::{AssumedSpace, Components, Method, Params, Preset, ReadOptions};
 pub use read::{Loaded, files, read};
 pub use read_error::ReadError;
 pub use read_mask::read_mask;
 pub use segment::{Segmented, clean, segment};
+pub use trachea::{SEED_COLUMNS, SeedCandidate, seeds_to_tsv};

@@ -7,6 +7,9 @@ use glam::DVec3;
 use serde::de::{self, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use crate::growth::Towards;
+use crate::labels::Labels;
+
 /// How a file is read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReadOptions {
@@ -72,6 +75,13 @@ impl AssumedSpace {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
+    /// What a scan shows, where nothing else is said: `"airway"` grows from the trachea, which it finds by itself, up
+    /// to the last threshold before the region leaks into the lung; `"vessel"` grows from a seed down to the last
+    /// threshold before it leaks, or without a seed takes all from 150 HU on (vessels with contrast, and bone).
+    /// Default: none, so that a scan is refused until a method is given. Keys that are set stay as they are; a mask
+    /// or a label map needs no preset and heeds none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub preset: Option<Preset>,
     /// How the organ's voxels are chosen. Default `auto`: a volume of two values is the mask itself, a volume with
     /// `label` set is a label map, and everything else must be told.
     pub method: Method,
@@ -82,11 +92,14 @@ pub struct Params {
     /// an airway a little too much lets it leak into the lung.
     pub upper: Option<f64>,
     /// For `region-grow`: the voxel (x, y, z) from 0 on the file's own axes at which growing starts.
+    /// Default: none; with `preset = "airway"` the trachea is looked for.
     pub seed_voxel: Option<[i64; 3]>,
     /// For `region-grow`: the point in RAS+ mm at which growing starts, instead of `seed_voxel`.
     pub seed_mm: Option<[f64; 3]>,
-    /// For `label`: the value of the organ in the label map.
-    pub label: Option<f64>,
+    /// For `label`: the organ in the label map, by value or by name, or several of them: `3`, `"trachea"`,
+    /// `"lung_vessels, 2"`, `[1, 2]`. Names are those of TotalSegmentator's tasks `total` and `lung_vessels`, and
+    /// `airway` for `lung_trachea_bronchia`.
+    pub label: Option<Labels>,
     /// How many 26-connected components stay, the largest first: `"largest"`, `"all"`, or a number from 1.
     /// Default `"largest"`: the islands of a mask are mostly noise, and a tree is one piece.
     pub components: Components,
@@ -96,11 +109,17 @@ pub struct Params {
     /// Whether background that is closed in by the mask (6-connected) becomes foreground. Default true: a cavity
     /// would become a closed shell in the skeleton.
     pub fill_cavities: bool,
+    /// Whether tunnels are closed at places where a blur of 0.7 voxel closes them: pinholes and bridges of a voxel or
+    /// two, faults of the mask, each of which would be a loop of the skeleton. Default true: on rough phantoms 184
+    /// tunnels became 6 and the tips found rose from 87 to 98 %; no tip was lost on any mask tried. Tunnels that
+    /// are left are cut in the tree.
+    pub close_tunnels: bool,
 }
 
 impl Default for Params {
     fn default() -> Self {
         Self {
+            preset: None,
             method: Method::Auto,
             lower: None,
             upper: None,
@@ -110,9 +129,44 @@ impl Default for Params {
             components: Components::Largest,
             min_component_ml: 0.0,
             fill_cavities: true,
+            close_tunnels: true,
         }
     }
 }
+
+/// What a scan shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preset {
+    /// Airways: air inside walls.
+    Airway,
+    /// Vessels with contrast: bright inside dark.
+    Vessel,
+}
+
+impl Preset {
+    /// Towards which values a region grows from inside the organ.
+    #[must_use]
+    pub fn towards(self) -> Towards {
+        match self {
+            Self::Airway => Towards::Bright,
+            Self::Vessel => Towards::Dark,
+        }
+    }
+
+    /// How far a region grows at most, in HU. Airways: half-way from air to tissue, where a voxel is half wall.
+    /// Vessels: well above tissue without contrast.
+    #[must_use]
+    pub fn limit_hu(self) -> f64 {
+        match self {
+            Self::Airway => -500.0,
+            Self::Vessel => 100.0,
+        }
+    }
+}
+
+/// Where vessels with contrast begin, in HU: above tissue and most of its noise.
+pub(crate) const VESSEL_FROM_HU: f64 = 150.0;
 
 /// How the organ's voxels are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -124,9 +178,9 @@ pub enum Method {
     Mask,
     /// Every voxel with a value in the band.
     Threshold,
-    /// The voxels in the band that are 6-connected with the seed.
+    /// The voxels in the band that are 6-connected with the seed. With a preset and no band, the band's end is found.
     RegionGrow,
-    /// Every voxel with the value `label`.
+    /// Every voxel with a value of `label`.
     Label,
 }
 
@@ -229,12 +283,14 @@ impl Params {
             let message = format!("has no use with method = \"{}\", only with {needs}", method.name());
             ParamError::check(key, !is_set, message)
         };
-        if !method.uses_band() {
+        // A preset may turn `auto` into any of these.
+        let is_free = method == Method::Auto && self.preset.is_some();
+        if !method.uses_band() && !is_free {
             let needs = "\"threshold\" and \"region-grow\"";
             unused("lower", self.lower.is_some(), needs)?;
             unused("upper", self.upper.is_some(), needs)?;
         }
-        if method != Method::RegionGrow {
+        if method != Method::RegionGrow && !is_free {
             unused("seed_voxel", self.seed_voxel.is_some(), "\"region-grow\"")?;
             unused("seed_mm", self.seed_mm.is_some(), "\"region-grow\"")?;
         }
@@ -243,7 +299,8 @@ impl Params {
         }
         self.validate_band()?;
         self.validate_seed()?;
-        ParamError::check("label", self.label.is_none_or(f64::is_finite), "must be a finite number")?;
+        let are_legal = self.label.as_ref().is_none_or(Labels::are_legal);
+        ParamError::check("label", are_legal, "must be a finite number, a name, or several of them")?;
         let needs_label = method == Method::Label && self.label.is_none();
         ParamError::check("label", !needs_label, "must be set with method = \"label\"")?;
         let keeps_one = self.components.limit() > 0;
@@ -256,7 +313,8 @@ impl Params {
     fn validate_band(&self) -> Result<(), ParamError> {
         ParamError::check("lower", self.lower.is_none_or(|v| !v.is_nan()), "must be a number, is nan")?;
         ParamError::check("upper", self.upper.is_none_or(|v| !v.is_nan()), "must be a number, is nan")?;
-        let is_open = self.lower.is_none() && self.upper.is_none();
+        let is_found = self.method == Method::RegionGrow && self.preset.is_some();
+        let is_open = self.lower.is_none() && self.upper.is_none() && !is_found;
         let message = format!("or `lower` must be set with method = \"{}\"", self.method.name());
         ParamError::check("upper", !(self.method.uses_band() && is_open), message)?;
         let (lower, upper) = self.band();
@@ -269,8 +327,14 @@ impl Params {
         let is_double = self.seed_mm.is_some() && self.seed_voxel.is_some();
         ParamError::check("seed_mm", !is_double, "must not be set together with seed_voxel")?;
         let is_missing =
-            self.method == Method::RegionGrow && self.seed_mm.is_none() && self.seed_voxel.is_none();
+            self.method == Method::RegionGrow && self.preset != Some(Preset::Airway) && !self.has_seed();
         ParamError::check("seed_voxel", !is_missing, "or seed_mm must be set with method = \"region-grow\"")
+    }
+
+    /// Whether a seed is given.
+    #[must_use]
+    pub fn has_seed(&self) -> bool {
+        self.seed_mm.is_some() || self.seed_voxel.is_some()
     }
 
     /// The band of values, with infinite ends where none is set.

@@ -15,10 +15,10 @@ use espalier_model::{Bits, Report};
 use crate::dicom;
 use crate::read::{check_limit, count_grid, orthogonal_grid};
 use crate::segment::segment_selection;
-use crate::select::{MASK, Selection, Wish, background, is_in_mask, wish};
+use crate::select::{MASK, Selection, Wish, background, is_in_mask, needs_preset, wish};
 use crate::stored::Stored;
 use crate::stream::{self, Inspected};
-use crate::{Error, Kind, Method, Params, ReadError, ReadOptions, Segmented, read, segment};
+use crate::{Error, Kind, Params, ReadError, ReadOptions, Segmented, read, segment};
 
 /// Reads the volume in a file and makes a mask of it.
 ///
@@ -83,35 +83,44 @@ impl File<'_> {
         report: &mut Report,
     ) -> Result<Option<Selection>, Error> {
         match wish(params) {
-            Wish::Region => Ok(None),
+            Wish::Names(_) | Wish::Region => Ok(None),
             Wish::Values { is_wanted, what } => {
                 self.named(check_limit(bits_bytes(stored), self.options))?;
                 let bits = self.named(stream::choose(stored, is_wanted, report))?;
-                Ok(Some(Selection { bits, what }))
+                Ok(Some(Selection::of(bits, what)))
             }
             Wish::Kind => {
                 self.named(check_limit(bits_bytes(stored), self.options))?;
-                let bits = self.mask_bits(stored, params.method, report)?;
-                Ok(Some(Selection { bits, what: MASK.to_owned() }))
+                let bits = self.mask_bits(stored, params, report)?;
+                Ok(bits.map(|bits| Selection::of(bits, MASK)))
             }
         }
     }
 
-    /// The voxels that are not background, in a volume that says itself which those are.
-    fn mask_bits(&self, stored: &mut Stored, method: Method, report: &mut Report) -> Result<Bits, Error> {
+    /// The voxels that are not background, in a volume that says itself which those are; none for a scan with a
+    /// preset.
+    fn mask_bits(
+        &self,
+        stored: &mut Stored,
+        params: &Params,
+        report: &mut Report,
+    ) -> Result<Option<Bits>, Error> {
         let Inspected { census, mut bits, first, is_exact } = self.named(stream::inspect(stored, report))?;
         let kind = census.kind();
+        if params.preset.is_some() && needs_preset(&kind, params.method) {
+            return Ok(None);
+        }
         let has_two_values = matches!(kind, Kind::Mask { .. });
-        let background = background(kind, method)?;
+        let background = background(kind, params.method)?;
         if is_exact && first == background {
-            return Ok(bits);
+            return Ok(Some(bits));
         }
         if is_exact && has_two_values {
             invert(&mut bits);
-            return Ok(bits);
+            return Ok(Some(bits));
         }
         let mut again = self.open(&mut Report::default())?;
-        self.named(stream::choose(&mut again, is_in_mask(background), &mut Report::default()))
+        self.named(stream::choose(&mut again, is_in_mask(background), &mut Report::default())).map(Some)
     }
 }
 

@@ -1,22 +1,27 @@
 //! Region growing from a seed.
 //!
-//! **Input** a volume, a seed voxel, a band of values. **Output** one bit a voxel.
-//! **Steps** 1. choose the voxels that lie in the band, ends included; 2. label their components by faces
+//! **Input** a volume, a seed voxel, a band of values; with a preset, both can be left open. **Output** one bit a
+//! voxel, and how the region grew.
+//! **Steps** 0. find the seed and the band's end where they are open; 1. choose the voxels that lie in the band, ends included; 2. label their components by faces
 //! (6-connected); 3. keep the seed's.
 //! **Guarantees** the result is the 6-connected component of the band that holds the seed. No recursion.
 //! **Why not 26-connected?** An airway's wall is thinner than a voxel in places; over edges and corners the
 //! region leaks into the lung at the very same threshold.
 //! **Cost** O(voxels) time, two bits a voxel and the runs of the band.
 
-use espalier_model::{Bits, Grid, Volume};
+use espalier_model::{Bits, Grid, Report, Volume};
 use glam::DVec3;
 
 use crate::choose::choose;
+use crate::growth::{Growth, Towards};
+use crate::kind::Census;
 use crate::runs::{Connectivity, Runs};
-use crate::{Error, Params};
+use crate::select::Selection;
+use crate::trachea::SeedCandidate;
+use crate::{Error, Params, Preset, growth, trachea};
 
 /// The seed of the parameters as a voxel inside the grid.
-pub(crate) fn seed_voxel(grid: &Grid, params: &Params) -> Result<[usize; 3], Error> {
+fn seed_voxel(grid: &Grid, params: &Params) -> Result<[usize; 3], Error> {
     let shape = grid.shape();
     let inside = |[x, y, z]: [i64; 3]| grid.voxel_at(DVec3::new(x as f64, y as f64, z as f64));
     let (found, shown) = match (params.seed_voxel, params.seed_mm) {
@@ -31,8 +36,115 @@ pub(crate) fn seed_voxel(grid: &Grid, params: &Params) -> Result<[usize; 3], Err
     found.ok_or(Error::SeedOutside { seed: shown, shape })
 }
 
+/// Grows a region from the seed that is given, or found, to the threshold that is given, or found.
+pub(crate) fn grow(volume: &Volume, params: &Params) -> Result<Selection, Error> {
+    let mut report = Report::default();
+    let (seed, seeds) = choose_seed(volume, params, &mut report)?;
+    let (growth, band) = choose_band(volume, params, seed, &mut report)?;
+    let bits = region(volume, seed, band)?;
+    Ok(Selection { bits, what: format!("the region in {} to {}", band.0, band.1), report, growth, seeds })
+}
+
+/// The seed of the parameters, else the trachea.
+fn choose_seed(
+    volume: &Volume,
+    params: &Params,
+    report: &mut Report,
+) -> Result<([usize; 3], Vec<SeedCandidate>), Error> {
+    if params.has_seed() || params.preset != Some(Preset::Airway) {
+        return Ok((seed_voxel(volume.grid(), params)?, Vec::new()));
+    }
+    let candidates = trachea::find(volume);
+    let Some(best) = candidates.first() else {
+        let mut census = Census::default();
+        volume.for_each_value(|value| census.see(value));
+        return Err(Error::NoTrachea { min: census.min, max: census.max });
+    };
+    report.count_usize("seed_candidates", candidates.len());
+    report.count_usize("seed_voxel_x", best.voxel[0]);
+    report.count_usize("seed_voxel_y", best.voxel[1]);
+    report.count_usize("seed_voxel_z", best.voxel[2]);
+    report.count("seed_score", best.score);
+    report.count("seed_score_of_next", candidates.get(1).map_or(0.0, |next| next.score));
+    Ok((best.voxel, candidates))
+}
+
+/// The band of the parameters; of an end that is not given, what lies before the leak.
+fn choose_band(
+    volume: &Volume,
+    params: &Params,
+    seed: [usize; 3],
+    report: &mut Report,
+) -> Result<(Option<Growth>, (f64, f64)), Error> {
+    let band = params.band();
+    let towards = match (params.lower, params.upper, params.preset) {
+        (None, None, Some(preset)) => preset.towards(),
+        (None, Some(_), _) => Towards::Bright,
+        (Some(_), None, _) => Towards::Dark,
+        _ => return Ok((None, band)),
+    };
+    let is_given = params.lower.is_some() || params.upper.is_some();
+    let limit = match (towards, params.preset) {
+        (_, Some(preset)) if !is_given => preset.limit_hu(),
+        (Towards::Bright, _) => band.1,
+        (Towards::Dark, _) => band.0,
+    };
+    let value = volume.value(volume.grid().index(seed));
+    let (open_lower, open_upper) = match towards {
+        Towards::Bright => (band.0, limit),
+        Towards::Dark => (limit, band.1),
+    };
+    if !(open_lower..=open_upper).contains(&value) {
+        return Err(seed_error(volume, seed, (open_lower, open_upper)));
+    }
+    let growth = growth::measure(volume, seed, towards, limit);
+    count(&growth, report);
+    if is_given {
+        warn_of_leak(&growth, limit, report);
+        return Ok((Some(growth), band));
+    }
+    let threshold = growth.threshold().ok_or_else(|| no_knee(&growth))?;
+    let band = match towards {
+        Towards::Bright => (band.0, threshold),
+        Towards::Dark => (threshold, band.1),
+    };
+    Ok((Some(growth), band))
+}
+
+fn count(growth: &Growth, report: &mut Report) {
+    if let Some((stable, leaking)) = growth.leak() {
+        report.count("stable_threshold", stable.threshold);
+        report.count("stable_ml", growth.ml(stable));
+        report.count("leaking_threshold", leaking.threshold);
+        report.count("leaking_ml", growth.ml(leaking));
+    }
+}
+
+fn warn_of_leak(growth: &Growth, limit: f64, report: &mut Report) {
+    if let Some((stable, leaking)) = growth.leak() {
+        report.warn(
+            "W-VOLUME-LEAK",
+            format!(
+                "the region seems to leak: {:.1} ml at {}, {:.1} ml at {}, and the band goes on to {limit}",
+                growth.ml(stable),
+                stable.threshold,
+                growth.ml(leaking),
+                leaking.threshold
+            ),
+        );
+    }
+}
+
+fn no_knee(growth: &Growth) -> Error {
+    let at = |share: f64| {
+        let level = growth.levels[((growth.levels.len() - 1) as f64 * share) as usize];
+        (level.threshold, growth.ml(level))
+    };
+    Error::NoKnee { curve: [at(0.0), at(0.25), at(0.5), at(0.75), at(1.0)] }
+}
+
 /// The region about `seed` with values in the band.
-pub(crate) fn grow(volume: &Volume, seed: [usize; 3], (lower, upper): (f64, f64)) -> Result<Bits, Error> {
+fn region(volume: &Volume, seed: [usize; 3], (lower, upper): (f64, f64)) -> Result<Bits, Error> {
     let in_band = |value: f64| (lower..=upper).contains(&value);
     if !in_band(volume.value(volume.grid().index(seed))) {
         return Err(seed_error(volume, seed, (lower, upper)));

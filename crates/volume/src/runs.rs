@@ -100,6 +100,23 @@ impl Runs {
         (run < row.end && self.runs[run].range().contains(&x)).then_some(run)
     }
 
+    /// The rows whose voxels can touch those of a row, itself among them.
+    pub(crate) fn rows_about(&self, row: usize) -> impl Iterator<Item = usize> + use<> {
+        let [_, ny, nz] = self.shape;
+        let (y, z) = (row % ny, row / ny);
+        let rows = move |z: usize| (y.saturating_sub(1)..(y + 2).min(ny)).map(move |y| z * ny + y);
+        (z.saturating_sub(1)..(z + 2).min(nz)).flat_map(rows)
+    }
+
+    /// The runs of a row that a run of the same row, or of one about it, touches, over corners too.
+    pub(crate) fn touching(&self, row: usize, run: Run) -> Range<usize> {
+        let row = self.of_row(row);
+        let runs = &self.runs[row.clone()];
+        let first = runs.partition_point(|other| other.end < run.start);
+        let last = runs.partition_point(|other| other.start <= run.end);
+        row.start + first..row.start + last.max(first)
+    }
+
     /// The connected components.
     pub(crate) fn components(&self, connectivity: Connectivity) -> Components {
         let [_, ny, nz] = self.shape;

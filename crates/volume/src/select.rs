@@ -3,12 +3,16 @@
 //! **Input** a volume and [`Params`]. **Output** one bit a voxel, and a phrase for what was chosen.
 //! **Steps** 1. where the method is `auto`, settle it by what the volume is; 2. test each voxel.
 //! **Guarantees** `auto` never guesses: it takes a volume of two values for the mask, a given label for a label,
-//! and asks otherwise. A value that is not a number is never chosen.
+//! a scan for what the preset says, and asks otherwise. A value that is not a number is never chosen.
 
-use espalier_model::{Bits, Volume};
+use espalier_model::{Bits, Report, Volume};
 
 use crate::choose::choose;
-use crate::{Error, Kind, Method, Params, inspect_kind, region_grow};
+use crate::growth::Growth;
+use crate::labels::{self, Labels};
+use crate::params::VESSEL_FROM_HU;
+use crate::trachea::SeedCandidate;
+use crate::{Error, Kind, Method, Params, Preset, inspect_kind, region_grow};
 
 /// How many labels an error lists.
 const N_LISTED: usize = 20;
@@ -17,22 +21,68 @@ const N_LISTED: usize = 20;
 pub(crate) struct Selection {
     pub(crate) bits: Bits,
     pub(crate) what: String,
+    /// What was counted and seen on the way.
+    pub(crate) report: Report,
+    /// How a region grew, and from where it could have.
+    pub(crate) growth: Option<Growth>,
+    pub(crate) seeds: Vec<SeedCandidate>,
+}
+
+impl Selection {
+    pub(crate) fn of(bits: Bits, what: impl Into<String>) -> Self {
+        Self { bits, what: what.into(), report: Report::default(), growth: None, seeds: Vec::new() }
+    }
 }
 
 pub(crate) fn select(volume: &Volume, params: &Params) -> Result<Selection, Error> {
     match wish(params) {
         Wish::Kind => {
-            let background = background(inspect_kind(volume), params.method)?;
-            Ok(Selection { bits: choose(volume, is_in_mask(background)), what: MASK.to_owned() })
+            let kind = inspect_kind(volume);
+            match params.preset.filter(|_| needs_preset(&kind, params.method)) {
+                Some(preset) => select_by_preset(volume, preset, params),
+                None => {
+                    let background = background(kind, params.method)?;
+                    Ok(Selection::of(choose(volume, is_in_mask(background)), MASK))
+                }
+            }
         }
-        Wish::Values { is_wanted, what } => Ok(Selection { bits: choose(volume, is_wanted), what }),
-        Wish::Region => {
-            let (lower, upper) = params.band();
-            let seed = region_grow::seed_voxel(volume.grid(), params)?;
-            let bits = region_grow::grow(volume, seed, (lower, upper))?;
-            Ok(Selection { bits, what: format!("the region in {lower} to {upper}") })
-        }
+        Wish::Values { is_wanted, what } => Ok(Selection::of(choose(volume, is_wanted), what)),
+        Wish::Names(labels) => select_names(volume, &labels),
+        Wish::Region => region_grow::grow(volume, params),
     }
+}
+
+/// Labels of which some are given by name.
+fn select_names(volume: &Volume, labels: &Labels) -> Result<Selection, Error> {
+    let present = match inspect_kind(volume) {
+        Kind::Labels { values } => values,
+        Kind::Mask { background, foreground } => vec![background, foreground],
+        Kind::Constant { value } => vec![value],
+        Kind::Ct { min, max } => return Err(Error::NoLabelMap { label: labels.to_string(), min, max }),
+    };
+    let (values, notes) = labels::resolve(labels, &present)?;
+    let mut selection = Selection::of(choose(volume, |v| values.contains(&v)), format!("label {labels}"));
+    notes.into_iter().for_each(|note| selection.report.warn("W-VOLUME-LABEL-NAME", note));
+    Ok(selection)
+}
+
+/// A scan by what it shows.
+fn select_by_preset(volume: &Volume, preset: Preset, params: &Params) -> Result<Selection, Error> {
+    if preset == Preset::Airway || params.has_seed() {
+        return region_grow::grow(volume, params);
+    }
+    let lower = params.lower.unwrap_or(VESSEL_FROM_HU);
+    let upper = params.upper.unwrap_or(f64::INFINITY);
+    let bits = choose(volume, |value| (lower..=upper).contains(&value));
+    let mut selection = Selection::of(bits, format!("the band {lower} to {upper}"));
+    let message = format!("preset \"vessel\" without a seed: all from {lower} on, bone as well as vessels");
+    selection.report.warn("W-VOLUME-PRESET", message);
+    Ok(selection)
+}
+
+/// Whether a volume of this kind is taken for what the preset says.
+pub(crate) fn needs_preset(kind: &Kind, method: Method) -> bool {
+    method == Method::Auto && matches!(kind, Kind::Ct { .. })
 }
 
 /// What decides whether a voxel is chosen.
@@ -41,13 +91,15 @@ pub(crate) enum Wish {
     Kind,
     /// The voxel's value alone.
     Values { is_wanted: Box<dyn Fn(f64) -> bool + Sync>, what: String },
+    /// Its value, and all values that there are: labels by name.
+    Names(Labels),
     /// Its place and the whole volume.
     Region,
 }
 
 pub(crate) fn wish(params: &Params) -> Wish {
     let (lower, upper) = params.band();
-    match (params.method, params.label) {
+    match (params.method, &params.label) {
         (Method::Auto, None) | (Method::Mask, _) => Wish::Kind,
         (Method::Threshold, _) => Wish::Values {
             is_wanted: Box::new(move |value| (lower..=upper).contains(&value)),
@@ -56,8 +108,14 @@ pub(crate) fn wish(params: &Params) -> Wish {
         (Method::RegionGrow, _) => Wish::Region,
         // `Params::validate` refuses the method `label` without one.
         (Method::Auto | Method::Label, label) => {
-            let label = label.unwrap_or(f64::NAN);
-            Wish::Values { is_wanted: Box::new(move |value| value == label), what: format!("label {label}") }
+            let labels = label.clone().unwrap_or_else(|| Labels(Vec::new()));
+            match labels.values() {
+                Some(values) => Wish::Values {
+                    is_wanted: Box::new(move |value| values.contains(&value)),
+                    what: format!("label {labels}"),
+                },
+                None => Wish::Names(labels),
+            }
         }
     }
 }
@@ -81,10 +139,10 @@ pub(crate) fn background(kind: Kind, method: Method) -> Result<f64, Error> {
         Kind::Labels { values } => Err(labels_need_one(&values)),
         Kind::Ct { min, max } => Err(Error::MethodNeeded {
             found: format!("the volume holds values from {min} to {max}, like a CT"),
-            way_out:
-                "set volume.method = \"region-grow\" with seed_voxel and upper (an airway: near -900 HU) \
-                      or \"threshold\" with lower and upper (vessels with contrast: from 150 HU)"
-                    .to_owned(),
+            way_out: "set volume.preset = \"airway\" or \"vessel\"; or volume.method = \"region-grow\" with seed_voxel \
+                      and upper (an airway: near -900 HU) or \"threshold\" with lower and upper (vessels with \
+                      contrast: from 150 HU)"
+                .to_owned(),
         }),
     }
 }

@@ -4,9 +4,10 @@
 
 use std::path::PathBuf;
 
-use espalier_model::{Diagnose, Mask};
+use espalier_model::{Diagnose, LedgerKind, Mask};
 use espalier_volume::{
-    Components, Error, Kind, Method, Params, ReadOptions, Segmented, inspect_kind, read, read_mask, segment,
+    Components, Error, Kind, Labels, Method, Params, Preset, ReadOptions, Segmented, inspect_kind, read,
+    read_mask, segment,
 };
 
 fn data() -> Option<PathBuf> {
@@ -28,6 +29,7 @@ fn airway_params(upper: f64) -> Params {
         upper: Some(upper),
         seed_voxel: Some([58, 80, 85]),
         fill_cavities: false,
+        close_tunnels: false,
         ..Params::default()
     }
 }
@@ -38,9 +40,12 @@ fn airway_grows_to_the_reference() {
     assert!(matches!(inspect_kind(&ct.volume), Kind::Ct { .. }));
     assert_eq!(ct.volume.grid().orientation(), "LPS");
     let reference = load("totalseg_pulmonary_airway.nii.gz").expect("data is set");
-    let reference: Mask = segment(&reference.volume, &Params { fill_cavities: false, ..Params::default() })
-        .expect("a mask")
-        .mask;
+    let reference: Mask = segment(
+        &reference.volume,
+        &Params { fill_cavities: false, close_tunnels: false, ..Params::default() },
+    )
+    .expect("a mask")
+    .mask;
 
     let grown = segment(&ct.volume, &airway_params(-865.0)).expect("an airway");
     assert_eq!(grown.mask.n_foreground(), 8208);
@@ -64,6 +69,66 @@ fn airway_grows_to_the_reference() {
     assert_eq!(segment(&ct.volume, &by_mm).expect("an airway").mask, grown.mask);
     let off = Params { seed_voxel: Some([0, 0, 0]), ..airway_params(-865.0) };
     assert!(matches!(segment(&ct.volume, &off), Err(Error::SeedOutOfBand { .. })));
+}
+
+/// No number given: the trachea is found, the region stops before the wall gives way.
+#[test]
+fn the_airway_grows_by_itself() {
+    let Some(ct) = load("totalseg_pulmonary_ct.nii.gz") else { return };
+    let params = Params { preset: Some(Preset::Airway), ..Params::default() };
+    let grown = segment(&ct.volume, &params).expect("an airway");
+    let count = |key| grown.report.get(key).unwrap_or(f64::NAN);
+    assert!((25.0..30.0).contains(&count("foreground_ml")), "{}", count("foreground_ml"));
+    assert_eq!((count("stable_threshold"), count("leaking_threshold")), (-863.0, -862.0));
+    assert!(count("leaking_ml") > 2.0 * count("stable_ml"));
+    // The trachea is in the top slices of this crop only; the main bronchus comes second.
+    assert!(grown.seeds[0].voxel[2] > 95 && grown.seeds.len() > 1, "{:?}", grown.seeds);
+    // At the leak's own threshold the region is what flooding it plainly gives.
+    let growth = grown.growth.expect("it grew");
+    for level in growth.levels.iter().filter(|level| level.threshold % 16.0 == 0.0) {
+        let fixed = Params {
+            method: Method::RegionGrow,
+            upper: Some(level.threshold),
+            seed_voxel: Some(grown.seeds[0].voxel.map(|v| v as i64)),
+            ..Params::default()
+        };
+        let plain = segment(&ct.volume, &fixed).expect("a region");
+        assert_eq!(plain.report.get("selected_voxels"), Some(level.n_voxels as f64));
+    }
+    let leaky = segment(&ct.volume, &airway_params(-850.0)).expect("a region");
+    assert!(leaky.report.warnings.iter().any(|warning| warning.code == "W-VOLUME-LEAK"));
+
+    // A head has no trachea: it says so, and what to do.
+    let head = load("ct_avm_head_cta.nii.gz").expect("data is set");
+    let error = segment(&head.volume, &params).expect_err("no trachea");
+    assert_eq!((error.code(), error.class().exit_code()), ("E-VOLUME-NO-TRACHEA", 3));
+    assert!(error.hint().contains("volume.seed"), "{}", error.hint());
+}
+
+/// Tunnels before and after closing, and the places that were changed.
+const TUNNELS: [(&str, (usize, usize)); 5] = [
+    ("airquant_airway", (0, 0)),
+    ("exact09_case18_bronchi", (11, 5)),
+    ("medmpd_liver3_hepatic_vein", (8, 3)),
+    ("medmpd_lungs1_bronchi", (4, 0)),
+    ("totalseg_pulmonary_airway", (6, 4)),
+];
+
+#[test]
+fn tunnels_close_in_few_places() {
+    if data().is_none() {
+        return;
+    }
+    for (name, (before, most_after)) in TUNNELS {
+        let loaded = load(&format!("{name}.nii.gz")).expect("data is set");
+        let segmented = segment(&loaded.volume, &Params::default()).expect("a mask");
+        let count = |key| segmented.report.get(key).unwrap_or(0.0) as usize;
+        assert_eq!(count("tunnels"), before, "{name}");
+        assert!(count("tunnels_left") <= most_after, "{name}: {} left", count("tunnels_left"));
+        let n_changed = count("tunnel_repairs_filled_voxels") + count("tunnel_repairs_cleared_voxels");
+        assert!(n_changed <= 12 * before, "{name}: {n_changed} voxels");
+        assert_eq!(segmented.ledger.n_of(LedgerKind::TunnelClosed), count("tunnel_repairs"), "{name}");
+    }
 }
 
 /// Voxels, components, voxels of the largest component, and of it with its cavities filled.
@@ -91,7 +156,8 @@ fn masks_are_counted_as_scipy_counts_them() {
         let loaded = load(&format!("{name}.nii.gz")).expect("data is set");
         assert!(matches!(inspect_kind(&loaded.volume), Kind::Mask { .. }), "{name}");
         assert_eq!(loaded.volume.grid().orientation(), orientation, "{name}");
-        let segmented = segment(&loaded.volume, &Params::default()).expect("a mask");
+        let params = Params { close_tunnels: false, ..Params::default() };
+        let segmented = segment(&loaded.volume, &params).expect("a mask");
         let count = |key| segmented.report.get(key).unwrap_or(f64::NAN) as usize;
         let found = (
             count("selected_voxels"),
@@ -121,10 +187,21 @@ fn scans_and_label_maps_need_a_method() {
     assert_eq!(values.len(), 42);
     let error = segment(&labels.volume, &Params::default()).expect_err("a label map needs a label");
     assert!(error.hint().contains("as in --set volume.label=1;"), "{}", error.hint());
-    let params = Params { label: Some(117.0), components: Components::All, ..Params::default() };
+    let params = Params { label: Some(117.0.into()), components: Components::All, ..Params::default() };
     assert!(segment(&labels.volume, &params).expect("label 117").mask.n_foreground() > 0);
-    let error =
-        segment(&labels.volume, &Params { label: Some(999.0), ..Params::default() }).expect_err("none");
+    // By name: 117 is the last class of the task `total`.
+    let by_name = |name: &str| {
+        segment(&labels.volume, &Params { label: Some(Labels::parse(name)), ..Params::default() })
+    };
+    let named = by_name("spleen, costal_cartilages").expect("both");
+    assert_eq!(named.report.warnings.len(), 2);
+    let by_value = by_name("1,117").expect("both");
+    assert_eq!(named.mask, by_value.mask);
+    assert_eq!(by_name("lung_vessels").expect_err("another task").code(), "E-VOLUME-LABEL-ABSENT");
+    let error = by_name("hart").expect_err("unknown");
+    assert!(error.to_string().contains("heart"), "{error}");
+    let error = segment(&labels.volume, &Params { label: Some(999.0.into()), ..Params::default() })
+        .expect_err("none");
     assert_eq!((error.code(), error.class().exit_code()), ("E-VOLUME-EMPTY", 3));
 }
 
@@ -137,6 +214,7 @@ fn threshold_works_on_scaled_values() {
         lower: Some(200.0),
         components: Components::All,
         fill_cavities: false,
+        close_tunnels: false,
         ..Params::default()
     };
     let segmented = segment(&loaded.volume, &params).expect("vessels");
@@ -158,7 +236,7 @@ fn streamed_masks_equal_those_of_whole_volumes() {
         ("ct_avm_head_cta.nii.gz", band.clone()),
         ("vmtk_aorta.mha", band.clone()),
         ("cip_ct64.nrrd", Params { upper: Some(-900.0), ..band }),
-        ("totalseg_example_labels.nii.gz", Params { label: Some(117.0), ..any() }),
+        ("totalseg_example_labels.nii.gz", Params { label: Some(117.0.into()), ..any() }),
         ("totalseg_pulmonary_ct.nii.gz", airway_params(-865.0)),
     ];
     for (name, params) in cases {

@@ -2,7 +2,7 @@
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
 use espalier_model::{Diagnose, Grid, LedgerKind, Volume, Voxels};
-use espalier_volume::{Components, Error, Kind, Method, Params, Segmented, inspect_kind, segment};
+use espalier_volume::{Components, Error, Kind, Method, Params, Preset, Segmented, inspect_kind, segment};
 use glam::DVec3;
 use ndarray::Array3;
 
@@ -42,26 +42,29 @@ fn methods() {
     let all = Params { components: Components::All, ..Params::default() };
     check("..77 7...", &all, "..## #...");
     check("4466", &all, "..##");
-    check("0123 0321", &Params { label: Some(2.0), ..all }, "..#. ..#.");
-    let band = Params { method: Method::Threshold, lower: Some(2.0), upper: Some(3.0), ..all };
+    check("0123 0321", &Params { label: Some(2.0.into()), ..all }, "..#. ..#.");
+    let band = Params { method: Method::Threshold, lower: Some(2.0), upper: Some(3.0), ..all.clone() };
     check("01234567", &band, "..##....");
-    check("0120", &Params { method: Method::Mask, ..all }, ".##.");
+    check("0120", &Params { method: Method::Mask, ..all.clone() }, ".##.");
     // Over faces only, ends of the band included, and never out of the row into the next.
     let grow = Params { method: Method::RegionGrow, lower: Some(3.0), seed_voxel: Some([0, 0, 0]), ..all };
     check("35.9 .49. ...9", &grow, "##.. .##. ....");
     check("5..5 ....", &grow, "#... ....");
-    let by_mm = Params { seed_voxel: None, seed_mm: Some([13.4, 10.9, 10.0]), ..grow };
+    let by_mm = Params { seed_voxel: None, seed_mm: Some([13.4, 10.9, 10.0]), ..grow.clone() };
     check("5..5 ....", &by_mm, "...# ....");
 
     assert_eq!(code("0123", &Params::default()), "E-VOLUME-METHOD 2");
     assert_eq!(code("0000", &Params::default()), "E-VOLUME-EMPTY 3");
     assert_eq!(code("0000", &Params { method: Method::Mask, ..Params::default() }), "E-VOLUME-EMPTY 3");
-    assert_eq!(code("0012", &Params { label: Some(5.0), ..Params::default() }), "E-VOLUME-EMPTY 3");
+    assert_eq!(code("0012", &Params { label: Some(5.0.into()), ..Params::default() }), "E-VOLUME-EMPTY 3");
     assert_eq!(code("0012", &Params { lower: Some(9.0), ..band }), "E-PARAM 2");
     assert_eq!(code("0012", &grow), "E-VOLUME-EMPTY 3");
     assert_eq!(code("0092", &grow), "E-VOLUME-SEED-BAND 2");
     for seed in [[-1, 0, 0], [4, 0, 0], [0, i64::MAX, 0], [0, 0, i64::MIN]] {
-        assert_eq!(code("9092", &Params { seed_voxel: Some(seed), ..grow }), "E-VOLUME-SEED-OUTSIDE 2");
+        assert_eq!(
+            code("9092", &Params { seed_voxel: Some(seed), ..grow.clone() }),
+            "E-VOLUME-SEED-OUTSIDE 2"
+        );
     }
 }
 
@@ -155,6 +158,10 @@ fn parameters_are_checked() {
     let cases = [
         ("", ""),
         ("label = 3", ""),
+        ("label = 'trachea, 4'", ""),
+        ("label = [1, 'trachea']", ""),
+        ("label = ''", "label"),
+        ("label = nan", "label"),
         ("method = 'mask'\nlabel = 3", "label"),
         ("lower = 3", "lower"),
         ("method = 'label'", "label"),
@@ -184,5 +191,37 @@ fn parameters_are_checked() {
     {
         let error = toml::from_str::<Params>(text).expect_err(text);
         assert!(error.span().is_some(), "{text}: {error} has no place");
+    }
+}
+
+/// Volumes that are no chest: an error that says so, or a mask; never a panic.
+#[test]
+fn presets_on_hostile_volumes() {
+    let nan = f32::NAN;
+    let line = |n: usize, value: &dyn Fn(usize) -> f32| (0..n).map(value).collect::<Vec<f32>>();
+    let cases: [([usize; 3], Vec<f32>); 7] = [
+        ([1, 1, 1], vec![-1000.0]),
+        ([1, 1, 1], vec![nan]),
+        ([4, 4, 4], vec![nan; 64]),
+        ([4, 4, 4], vec![-1000.0; 64]),
+        // Air and tissue by turns, with holes in the data, one voxel thin along each axis.
+        ([40, 40, 1], line(1600, &|i| if i % 7 == 0 { nan } else { -1000.0 + (i % 40) as f32 * 30.0 })),
+        ([1, 40, 40], line(1600, &|i| if i % 3 == 0 { -1000.0 } else { i as f32 })),
+        ([8, 8, 8], line(512, &|i| if i == 100 { f32::INFINITY } else { -1e30 * (i as f32 + 1.0) })),
+    ];
+    for (shape, values) in cases {
+        let [nx, ny, nz] = shape;
+        let grid = Grid::axis_aligned(shape, DVec3::ONE, DVec3::ZERO).expect("legal");
+        let array = Array3::from_shape_vec((nz, ny, nx), values).expect("the shape");
+        let volume = Volume::new(grid, Voxels::F32(array), 1.0, 0.0);
+        for preset in [Preset::Airway, Preset::Vessel] {
+            for seed_voxel in [None, Some([0, 0, 0]), Some([9, 9, 9])] {
+                let params = Params { preset: Some(preset), seed_voxel, ..Params::default() };
+                if let Err(error) = segment(&volume, &params) {
+                    let class = error.class().exit_code();
+                    assert!([2, 3].contains(&class) && !error.hint().is_empty(), "{shape:?}: {error}");
+                }
+            }
+        }
     }
 }
