@@ -8,7 +8,8 @@ use anyhow::anyhow;
 use espalier_model::Diagnose;
 use espalier_model::diagnose::Class;
 use espalier_pipeline::{
-    Artifact, CompareRequest, Config, Error, Loaded, Override, Request, Stage, Subject, Summary, SweepRequest,
+    Artifact, CompareRequest, Config, Error, Loaded, Override, Request, SideFile, Stage, Subject, Summary,
+    SweepRequest,
 };
 
 use crate::args::{
@@ -156,14 +157,16 @@ fn run_stage_of_folder(
         // The resolved config has only the name of the input; where it lies stands apart.
         loaded.config.input.path = espalier_pipeline::input_of_run(folder).or(loaded.config.input.path);
     }
-    if let (None, Some(edits)) = (&stage.config, &mut loaded.config.embed.edits)
-        && !edits.is_empty()
-    {
-        // So has it of the edits; a path given here and now starts from here.
-        let is_set_now = arguments.common.overrides.iter().any(|set| set.key == "embed.edits");
-        let named = || Some(std::path::absolute(&*edits).ok()?.to_string_lossy().into_owned());
-        let path = if is_set_now { named() } else { espalier_pipeline::edits_of_run(folder) };
-        *edits = path.unwrap_or_else(|| std::mem::take(edits));
+    for side in SideFile::ALL {
+        let (None, Some(path)) = (&stage.config, side.slot(&mut loaded.config)) else { continue };
+        if path.is_empty() {
+            continue;
+        }
+        // So has it of the files beside; a path given here and now starts from here.
+        let is_set_now = arguments.common.overrides.iter().any(|set| set.key == side.key());
+        let named = || Some(std::path::absolute(&*path).ok()?.to_string_lossy().into_owned());
+        let known = if is_set_now { named() } else { espalier_pipeline::side_file_of_run(folder, side) };
+        *path = known.unwrap_or_else(|| std::mem::take(path));
     }
     let out = stage.out.clone().unwrap_or_else(|| folder.to_owned());
     let mut request = Request { from: Some(which), to: Some(which), ..request(arguments, loaded, out) };

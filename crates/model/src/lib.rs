@@ -9,6 +9,8 @@
 //! | [`swc::Traced`] | a tracing program, `phantom` | `tree` | `.swc` |
 //! | [`Tree`] | `tree` | `views`, `embed`, `render` | `tree.swc` |
 //! | [`Ledger`] | `tree` | the reader | `topology.tsv` |
+//! | [`Anatomy`] | `tree` | the reader | `branches.tsv`, `generations.tsv`, `profiles.tsv`, `stenoses.tsv` |
+//! | [`Tree`] and [`Anatomy`] | `tree` | other programs | `tree.vtp`, `tree.graphml`, `branches.nii.gz` |
 //! | [`ViewHierarchy`] | `views` | `embed`, `render` | `views.json` |
 //! | [`Edits`] | the user | `embed` | `edits.json` |
 //! | [`Embedding`] | `embed` | `render` | `embedding.json` |
@@ -19,12 +21,15 @@
 //!
 //! **Architecture Invariant:** no algorithms here, and no file access: files are bytes in and bytes out.
 
+pub mod anatomy;
 mod bits;
 pub mod diagnose;
 mod digest;
 mod edits;
 mod embedding;
+pub mod graphml_out;
 mod grid;
+pub mod label_table;
 mod ledger;
 mod mask;
 pub mod nifti_out;
@@ -38,7 +43,10 @@ mod tree;
 mod versioned;
 mod views;
 mod volume;
+pub mod vtp_out;
+mod xml;
 
+pub use anatomy::{Anatomy, BranchMeasures, Region};
 pub use bits::Bits;
 pub use diagnose::Diagnose;
 pub use edits::{Edit, EditError, Edits};

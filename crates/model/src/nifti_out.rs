@@ -132,6 +132,51 @@ pub fn skeleton(skeleton: &Skeleton) -> Result<Vec<u8>, NiftiOutError> {
     file.finish()
 }
 
+/// A number for each foreground voxel of a mask, in storage order, as the narrowest of 8, 16 and 32 unsigned bits that
+/// holds them all; background is 0.
+///
+/// # Errors
+/// [`NiftiOutError`] if the grid does not fit the format or the numbers do not fit the mask.
+pub fn labels(mask: &Mask, values: &[u32]) -> Result<Vec<u8>, NiftiOutError> {
+    match values.iter().max().copied().unwrap_or(0) {
+        0..=0xFF => labels_as(mask, values, Scalar::U8, |value| [value as u8]),
+        0x100..=0xFFFF => labels_as(mask, values, Scalar::U16, |value| (value as u16).to_le_bytes()),
+        _ => labels_as(mask, values, Scalar::U32, u32::to_le_bytes),
+    }
+}
+
+fn labels_as<const N: usize>(
+    mask: &Mask,
+    values: &[u32],
+    scalar: Scalar,
+    bytes_of: impl Fn(u32) -> [u8; N],
+) -> Result<Vec<u8>, NiftiOutError> {
+    let n_foreground = mask.n_foreground();
+    if values.len() != n_foreground {
+        return Err(NiftiOutError::Length { n_values: values.len(), n_voxels: n_foreground });
+    }
+    let mut file = File::new(mask.grid(), scalar, (1.0, 0.0), "espalier labels 1")?;
+    let [nx, ny, nz] = mask.grid().shape();
+    let mut plane = vec![0_u8; nx * ny * N];
+    let mut rest = values;
+    for z in 0..nz {
+        plane.fill(0);
+        for y in 0..ny {
+            for run in mask.bits().runs(z * ny + y) {
+                let (own, later) = rest.split_at(run.len());
+                rest = later;
+                let bytes = &mut plane[(y * nx + run.start) * N..(y * nx + run.end) * N];
+                bytes
+                    .chunks_exact_mut(N)
+                    .zip(own)
+                    .for_each(|(cell, &value)| cell.copy_from_slice(&bytes_of(value)));
+            }
+        }
+        file.gz.write_all(&plane)?;
+    }
+    file.finish()
+}
+
 /// Single-precision values on a grid, x fastest, such as radii in mm on skeleton voxels.
 ///
 /// # Errors

@@ -6,16 +6,18 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use espalier_model::polydata;
 use espalier_model::swc::{self, Traced};
 use espalier_model::{
     Comparison, Diagnose, Edits, Embedding, InscribedSpheres, Ledger, Mask, Report, Skeleton, Tree,
     ViewHierarchy,
 };
+use espalier_model::{label_table, polydata};
+use espalier_tree::LabelMap;
 
 use crate::config::{Input, Unit};
 use crate::error::Error;
 use crate::folder::RunFolder;
+use crate::side_file::SideFile;
 use crate::stage::{Artifact, Stage};
 
 /// The header key of `tree.swc` that says what the tree was made from, and what it says.
@@ -31,8 +33,8 @@ const DROPPED_FILE: &str = "stages/01-volume/dropped.tsv";
 pub(crate) struct Artifacts {
     /// Files named by the user, instead of those in the run folder.
     pub(crate) files: BTreeMap<Artifact, PathBuf>,
-    /// The user's manual edits of the embedding.
-    pub(crate) edits_path: Option<PathBuf>,
+    /// Files that the config names beside the input.
+    pub(crate) side_paths: BTreeMap<SideFile, PathBuf>,
     pub(crate) read_options: espalier_volume::ReadOptions,
     /// How a traced tree is scaled.
     pub(crate) input: Input,
@@ -177,8 +179,25 @@ impl Artifacts {
 
     /// The manual edits of the embedding of `tree`; none if the config names no file of them.
     pub(crate) fn edits(&self, tree: &Tree) -> Result<Edits, Error> {
-        let Some(path) = &self.edits_path else { return Ok(Edits::none(tree)) };
+        let Some(path) = self.side_paths.get(&SideFile::Edits) else { return Ok(Edits::none(tree)) };
         Edits::from_json(&self.read_text(path)?, tree).map_err(|error| Error::file(path, error))
+    }
+
+    /// The label map that branches are labelled by; none if the config names no file of one.
+    pub(crate) fn label_map(&self, lookup: Lookup<'_>, reach_mm: f64) -> Result<Option<LabelMap>, Error> {
+        let Some(path) = self.side_paths.get(&SideFile::Labels) else { return Ok(None) };
+        // The index of a volume is that of the input.
+        let options = espalier_volume::ReadOptions { volume_index: None, ..self.read_options };
+        let loaded = espalier_volume::read(path, &options)
+            .map_err(|error| Error::stage(lookup.stage)(Box::new(error)))?;
+        let names = match self.side_paths.get(&SideFile::LabelNames) {
+            Some(path) => {
+                let names = label_table::parse_names(&self.read_text(path)?);
+                names.map_err(|error| Error::file(path, error))?
+            }
+            None => BTreeMap::new(),
+        };
+        Ok(Some(LabelMap { volume: loaded.volume, names, reach_mm }))
     }
 
     pub(crate) fn embedding(&mut self, lookup: Lookup<'_>) -> Result<Arc<Embedding>, Error> {

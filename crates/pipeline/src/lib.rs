@@ -5,7 +5,7 @@
 //! | a TOML file, its overrides, and exact places for what is wrong in it | [`config`] |
 //! | the stages, their order, what each reads and writes | [`stage`] |
 //! | hand-over data, from memory or from the run folder | `artifacts` |
-//! | what each stage does with them | `steps` |
+//! | what each stage does with them | `steps`, `tree_outputs` |
 //! | the loop over the stages | [`run`](mod@run) |
 //! | methods and runs side by side | [`compare`](mod@compare) |
 //! | a config at many settings | [`sweep`](mod@sweep) |
@@ -32,9 +32,11 @@ mod phantom;
 mod provenance;
 pub mod run;
 mod settings;
+mod side_file;
 pub mod stage;
 mod steps;
 pub mod sweep;
+mod tree_outputs;
 mod verify;
 
 pub use compare::{CompareRequest, Compared, Subject, compare};
@@ -43,9 +45,10 @@ pub use error::{Error, NotSwept};
 pub use espalier_verify::{Check, Outcome};
 pub use event::Event;
 pub use phantom::make_phantom;
-pub use provenance::{edits_of_run, input_of_run};
+pub use provenance::{input_of_run, side_file_of_run};
 pub use run::{Request, Summary, run};
 pub use settings::Difference;
+pub use side_file::SideFile;
 pub use stage::{Artifact, Stage};
 pub use sweep::{Axis, SweepRequest, Swept, sweep};
 pub use verify::{Verification, verify};

@@ -1,5 +1,6 @@
 //! How a result came about: inputs, settings, times.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use espalier_model::Report;
@@ -10,6 +11,7 @@ use crate::clock;
 use crate::config::Config;
 use crate::error::Error;
 use crate::folder::{RunFolder, file_digest};
+use crate::side_file::SideFile;
 use crate::stage::Stage;
 
 /// What one stage cost.
@@ -50,9 +52,8 @@ pub(crate) const TIMING_COLUMNS: [Column; 4] = [
 const INPUTS_FILE: &str = "provenance/inputs.tsv";
 const RUN_FILE: &str = "provenance/run.json";
 const TIMINGS_FILE: &str = "provenance/timings.tsv";
-/// The roles of files in `provenance/inputs.tsv`.
+/// The role of the input in `provenance/inputs.tsv`.
 const INPUT: &str = "input";
-const EDITS: &str = "edits";
 
 /// The absolute path of the input of an earlier run in a folder, where it had one.
 #[must_use]
@@ -60,10 +61,10 @@ pub fn input_of_run(folder: &Path) -> Option<String> {
     path_of_run(folder, "input")
 }
 
-/// The absolute path of the manual edits of an earlier run in a folder, where it had some.
+/// The absolute path of a file beside the input of an earlier run in a folder, where it had one.
 #[must_use]
-pub fn edits_of_run(folder: &Path) -> Option<String> {
-    path_of_run(folder, "edits")
+pub fn side_file_of_run(folder: &Path, side: SideFile) -> Option<String> {
+    path_of_run(folder, side.role())
 }
 
 fn path_of_run(folder: &Path, key: &str) -> Option<String> {
@@ -87,15 +88,19 @@ fn input_rows(input: &[PathBuf]) -> Result<String, Error> {
     input.iter().map(|path| row(INPUT, path)).collect()
 }
 
-/// Brings the row of the manual edits in `provenance/inputs.tsv` up to date.
-pub(crate) fn write_edits(folder: &mut RunFolder, edits: Option<&Path>) -> Result<(), Error> {
+/// Brings the row of a file beside the input in `provenance/inputs.tsv` up to date.
+pub(crate) fn write_side_file(
+    folder: &mut RunFolder,
+    side: SideFile,
+    path: Option<&PathBuf>,
+) -> Result<(), Error> {
     let known = rows(folder)?;
-    if known.is_none() && edits.is_none() {
+    if known.is_none() && path.is_none() {
         return Ok(());
     }
     let known = known.unwrap_or_else(|| Table::with(&INPUT_COLUMNS).into_string());
-    let mut table: String = known.split_inclusive('\n').filter(|row| !is_of(EDITS, row)).collect();
-    table.extend(edits.map(|path| row(EDITS, path)).transpose()?);
+    let mut table: String = known.split_inclusive('\n').filter(|row| !is_of(side.role(), row)).collect();
+    table.extend(path.map(|path| row(side.role(), path)).transpose()?);
     folder.write(INPUTS_FILE, table.as_bytes())
 }
 
@@ -106,10 +111,10 @@ pub(crate) fn is_other_input(folder: &RunFolder, input: &[PathBuf]) -> Result<bo
     Ok(known != input_rows(input)?)
 }
 
-/// Whether the folder's embedding was made with manual edits of other content.
-pub(crate) fn is_other_edits(folder: &RunFolder, edits: &Path) -> Result<bool, Error> {
+/// Whether the folder's results were made with such a file of other content.
+pub(crate) fn is_other_side_file(folder: &RunFolder, side: SideFile, path: &Path) -> Result<bool, Error> {
     let Some(known) = rows(folder)? else { return Ok(false) };
-    let now = row(EDITS, edits)?;
+    let now = row(side.role(), path)?;
     Ok(!known.split_inclusive('\n').any(|row| row == now))
 }
 
@@ -142,9 +147,9 @@ struct RunRecord<'a> {
     seed: u64,
     /// The absolute path of the input, for stages that read it again.
     input: Option<String>,
-    /// The absolute path of the manual edits, likewise.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    edits: Option<String>,
+    /// The absolute paths of files beside it, likewise.
+    #[serde(flatten)]
+    side_files: BTreeMap<&'static str, String>,
     stages: Vec<&'static str>,
     threads: usize,
     finished_unix_seconds: u64,
@@ -155,7 +160,7 @@ struct RunRecord<'a> {
 pub(crate) fn write_run(
     folder: &RunFolder,
     config: &Config,
-    (input, edits): (Option<&Path>, Option<&Path>),
+    (input, side_paths): (Option<&Path>, &BTreeMap<SideFile, PathBuf>),
     costs: &[StageCost],
     digest: &str,
 ) -> Result<(), Error> {
@@ -167,7 +172,10 @@ pub(crate) fn write_run(
         name: &config.name,
         seed: config.seed,
         input: input.map_or_else(|| input_of_run(folder.path()), absolute),
-        edits: edits.and_then(absolute),
+        side_files: side_paths
+            .iter()
+            .filter_map(|(side, path)| Some((side.role(), absolute(path)?)))
+            .collect(),
         stages: costs.iter().map(|cost| cost.stage.name()).collect(),
         threads: rayon::current_num_threads(),
         finished_unix_seconds: clock::unix_seconds(),

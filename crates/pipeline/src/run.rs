@@ -13,6 +13,7 @@ use crate::event::Event;
 use crate::folder::RunFolder;
 use crate::provenance::{self, StageCost};
 use crate::settings::Settings;
+use crate::side_file::SideFile;
 use crate::stage::{Artifact, Stage};
 use crate::steps::{self, Step};
 
@@ -76,8 +77,8 @@ fn run_stages(request: &Request, events: &(dyn Fn(Event) + Sync)) -> Result<Summ
     let artifacts = artifacts_of(request, &source);
     let input = input_file(&stages, &artifacts);
     // A missing input must not leave a folder behind.
-    let edits = artifacts.edits_path.as_ref().filter(|_| stages.contains(&Stage::Embed));
-    for path in [input.as_ref(), edits].into_iter().flatten() {
+    let sides = artifacts.side_paths.iter().filter(|(side, _)| stages.contains(&side.stage()));
+    for path in input.iter().chain(sides.map(|(_, path)| path)) {
         let may_be_folder = matches!(source, Source::Volume(_)) && Some(path) == input.as_ref();
         steps::check_readable(path, may_be_folder)?;
     }
@@ -131,9 +132,8 @@ impl Run<'_> {
                     provenance::write_inputs(folder, &files.unwrap_or_default())?;
                 }
             }
-            let edits = self.artifacts.edits_path.as_deref();
-            if stage == Stage::Embed {
-                provenance::write_edits(folder, edits)?;
+            for side in SideFile::ALL.into_iter().filter(|side| side.stage() == stage) {
+                provenance::write_side_file(folder, side, self.artifacts.side_paths.get(&side))?;
             }
             write_outcome(folder, stage, &outcome)?;
             settings.adopt(folder, stage)?;
@@ -142,7 +142,8 @@ impl Run<'_> {
             let cost = StageCost { stage, seconds: watch.seconds(), peak_mb, parts };
             let seconds = cost.seconds;
             self.costs.push(cost);
-            provenance::write_run(folder, config, (input, edits), &self.costs, &digest)?;
+            let files = (input, &self.artifacts.side_paths);
+            provenance::write_run(folder, config, files, &self.costs, &digest)?;
 
             for warning in outcome.report.warnings {
                 events(Event::Warning { stage, code: warning.code, message: warning.message });
@@ -170,11 +171,11 @@ impl Run<'_> {
         if let Some(difference) = settings.difference(&earlier, available[0]) {
             return Err(Error::OtherSettings { from, difference: Box::new(difference) });
         }
-        let edits = self.artifacts.edits_path.as_ref().filter(|path| path.is_file());
-        if let Some(path) = edits.filter(|_| earlier.contains(&Stage::Embed))
-            && provenance::is_other_edits(folder, path)?
-        {
-            return Err(Error::OtherInput { from, path: path.clone(), first: Stage::Embed });
+        let sides = self.artifacts.side_paths.iter().filter(|(_, path)| path.is_file());
+        for (side, path) in sides.filter(|(side, _)| earlier.contains(&side.stage())) {
+            if provenance::is_other_side_file(folder, *side, path)? {
+                return Err(Error::OtherInput { from, path: path.clone(), first: side.stage() });
+            }
         }
         // Scans of many patients share one name; their content tells them apart. A scan that lies elsewhere now, or
         // nowhere, is no reason to stop: nothing will be read from it.
@@ -270,7 +271,6 @@ fn stages_to_do(request: &Request, source: &Source) -> Result<Vec<Stage>, Error>
 fn artifacts_of(request: &Request, source: &Source) -> Artifacts {
     let Loaded { config, base_dir } = &request.loaded;
     let input = &config.input;
-    let edits = config.embed.edits.as_ref().filter(|path| !path.is_empty());
     let mut files = request.files.clone();
     match source {
         Source::Volume(path) => _ = files.entry(Artifact::Volume).or_insert_with(|| path.clone()),
@@ -279,7 +279,10 @@ fn artifacts_of(request: &Request, source: &Source) -> Artifacts {
     }
     Artifacts {
         files,
-        edits_path: edits.map(|path| base_dir.join(path)),
+        side_paths: SideFile::ALL
+            .into_iter()
+            .filter_map(|side| Some((side, base_dir.join(side.path_in(config)?))))
+            .collect(),
         read_options: espalier_volume::ReadOptions {
             max_bytes: request.max_memory_bytes,
             volume_index: input.volume_index,

@@ -10,6 +10,7 @@ use toml::{Table, Value};
 use crate::config::Config;
 use crate::error::Error;
 use crate::folder::RunFolder;
+use crate::side_file::SideFile;
 use crate::stage::Stage;
 
 /// Where they stand.
@@ -78,14 +79,17 @@ impl Settings {
     }
 }
 
-/// The config without what is of this machine: of the paths of input and edits only the files' names.
+/// The config without what is of this machine: of the paths of files only their names.
 fn portable(config: &Config) -> Table {
     let mut portable = config.clone();
-    portable.embed.edits = portable.embed.edits.filter(|path| !path.is_empty());
-    for path in [&mut portable.input.path, &mut portable.embed.edits].into_iter().flatten() {
-        let name = Path::new(path.as_str()).file_name().unwrap_or_default();
-        *path = name.to_string_lossy().into_owned();
-    }
+    let name_alone = |path: &mut Option<String>| {
+        *path = path
+            .take()
+            .filter(|path| !path.is_empty())
+            .map(|path| Path::new(&path).file_name().unwrap_or_default().to_string_lossy().into_owned());
+    };
+    name_alone(&mut portable.input.path);
+    SideFile::ALL.into_iter().for_each(|side| name_alone(side.slot(&mut portable)));
     toml::from_str(&portable.to_toml()).unwrap_or_default()
 }
 

@@ -110,7 +110,21 @@ impl Stage {
             Self::Volume => &["mask.nii.gz", "dropped.tsv"],
             Self::Skeleton => &["skeleton.nii.gz"],
             Self::Radius => &["radius.nii.gz", "spheres.tsv"],
-            Self::Tree => &["/tree.swc", "/topology.tsv"],
+            Self::Tree => &[
+                "/tree.swc",
+                "/tree.vtp",
+                "/tree.graphml",
+                "/branches.tsv",
+                "/generations.tsv",
+                "/profiles.tsv",
+                "/stenoses.tsv",
+                "/topology.tsv",
+                "/branches.nii.gz",
+                "/branches.ctbl",
+                "/branches.label.txt",
+                // The embed stage on files of its own writes it too.
+                "/dictionary.tsv",
+            ],
             Self::Views => &["/views.json"],
             Self::Embed => &[
                 "/embedding.json",

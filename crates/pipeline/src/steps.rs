@@ -23,6 +23,7 @@ use crate::phantom;
 use crate::provenance::PartCost;
 use crate::run::boxed;
 use crate::stage::{Artifact, Stage};
+use crate::tree_outputs::{self, Made};
 
 /// What a stage came to: its files, not yet written.
 pub(crate) struct Outcome {
@@ -150,6 +151,7 @@ fn radius(step: &mut Step<'_>) -> Result<Outcome, Error> {
 fn tree(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let params = &step.config.tree;
     let mut ledger = Ledger::default();
+    let mut scan = None;
     let (built, mut report) = if step.is_traced() {
         let (traced, report) = step.take(Artifacts::traced)?;
         (espalier_tree::from_traced(&traced, params).map_err(|error| step.failed(error))?, report)
@@ -160,6 +162,7 @@ fn tree(step: &mut Step<'_>) -> Result<Outcome, Error> {
         ledger = step.take(Artifacts::dropped)?;
         let built =
             espalier_tree::build(&mask, &skeleton, &spheres, params).map_err(|error| step.failed(error))?;
+        scan = Some((mask, spheres));
         (built, Report::default())
     };
     report.extend(built.report);
@@ -180,11 +183,16 @@ fn tree(step: &mut Step<'_>) -> Result<Outcome, Error> {
         ledger_phrase(&built.ledger)
     );
     ledger.0.extend(built.ledger.0);
-    step.artifacts.tree = Some(Arc::new(tree));
-    let files = vec![
+    let labels = step.take(|artifacts, lookup| artifacts.label_map(lookup, params.label_reach_mm))?;
+    let scan = scan.as_ref().map(|(mask, spheres)| (&**mask, &**spheres));
+    let made = Made { tree: &tree, scan, labels, params };
+    let mut files = tree_outputs::files(&made, &mut report, |error| step.failed(error))?;
+    files.extend([
         step.place(Artifact::Tree, text.into_bytes()),
         ("topology.tsv".to_owned(), ledger.to_tsv().into_bytes()),
-    ];
+        ("dictionary.tsv".to_owned(), dictionary::text().into_bytes()),
+    ]);
+    step.artifacts.tree = Some(Arc::new(tree));
     Ok(Outcome { files, report, line })
 }
 

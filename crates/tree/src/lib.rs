@@ -11,6 +11,8 @@
 //! | 7 | `tips` | free ends are set where the organ ends |
 //! | 8 | `smooth` | the voxel staircase goes |
 //! | 9 | `merge`, `resample` | nodes where the shape changes |
+//! | 10 | `anatomy` | **[`measure`]**: length, calibre, angles, order of each branch; narrow places |
+//! | 11 | `ownership` | **[`branch_voxels`]**: the branch of each voxel of the mask |
 //! | – | `traced` | roots, duplicates and radii of a traced structure |
 //!
 //! Whatever is cut, pruned, dropped, extended or merged stands in the ledger with place, radius, length and reason.
@@ -35,6 +37,7 @@
 //! **Guarantees** same input and parameters, same tree; no recursion; ties go to the lower index, hence to storage order.
 
 mod adjacency;
+mod anatomy;
 mod components;
 mod curve;
 mod error;
@@ -45,6 +48,7 @@ mod loops;
 mod mask_walk;
 mod merge;
 mod outline;
+mod ownership;
 mod params;
 mod polylines;
 mod prune;
@@ -60,7 +64,9 @@ use espalier_model::swc::Traced;
 use espalier_model::{InscribedSpheres, Ledger, LedgerEntry, LedgerKind, Mask, Node, Report, Skeleton, Tree};
 use glam::DVec3;
 
+pub use anatomy::{LabelMap, MeasureContext, measure};
 pub use error::Error;
+pub use ownership::branch_voxels;
 pub use params::{Components, Loops, MissingRadii, Params, Resample, Root, Roots, Tips};
 pub use polylines::join_lines;
 

@@ -129,6 +129,23 @@ pub struct Params {
     pub roots: Roots,
     /// What to do with nodes of a traced structure that have radius 0. Default `neighbours`.
     pub missing_radii: MissingRadii,
+    /// A label map, such as lobes: the label along most of each branch goes to `branches.tsv`. A volume on any grid in
+    /// the tree's space; whole numbers, 0 is no label. The path is relative to the config. Default none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub labels: Option<String>,
+    /// Names of the labels: a line for each with value and name, or a colour table of 3D Slicer or ITK-SNAP. The path
+    /// is relative to the config. Default none: labels go by their values.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub label_names: Option<String>,
+    /// How far the nearest label may be from a branch that lies in none, in mm. 0 to 20. Default 5: a main bronchus runs
+    /// outside of all lobes, but near to one. Larger gives labels to more branches.
+    pub label_reach_mm: f64,
+    /// The least narrowing that `stenoses.tsv` lists, in percent of the reference diameter. 1 to 99. Default 25, where
+    /// CAD-RADS lets mild stenoses begin [Cury2016]. Larger lists fewer.
+    pub stenosis_percent: f64,
+    /// Whether `branches.nii.gz` is written, the mask by branch. Default true; it costs the compression of a volume of
+    /// the mask's size.
+    pub branch_volume: bool,
 }
 
 impl Default for Params {
@@ -147,6 +164,11 @@ impl Default for Params {
             step_mm: 2.0,
             roots: Roots::default(),
             missing_radii: MissingRadii::default(),
+            labels: None,
+            label_names: None,
+            label_reach_mm: 5.0,
+            stenosis_percent: 25.0,
+            branch_volume: true,
         }
     }
 }
@@ -169,6 +191,10 @@ impl Params {
         in_range("smooth_voxels", self.smooth_voxels, 0.0, 4.0)?;
         in_range("tolerance", self.tolerance, 1e-6, 1.0)?;
         in_range("step_mm", self.step_mm, 1e-9, 1e9)?;
+        in_range("label_reach_mm", self.label_reach_mm, 0.0, 20.0)?;
+        in_range("stenosis_percent", self.stenosis_percent, 1.0, 99.0)?;
+        let has_map = self.labels.is_some() || self.label_names.is_none();
+        ParamError::check("label_names", has_map, "names labels, but `labels` names no label map")?;
         let is_point = self.root_mm.is_none_or(|point| point.iter().all(|c| c.is_finite()));
         ParamError::check("root_mm", is_point, format!("must be three finite numbers, is {:?}", self.root_mm))
     }

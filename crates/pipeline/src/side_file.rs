@@ -1,0 +1,67 @@
+//! Files that a config names beside the input of the run.
+
+use crate::config::Config;
+use crate::stage::Stage;
+
+/// A file beside the input.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum SideFile {
+    /// `tree.labels`: a label map.
+    Labels,
+    /// `tree.label_names`: the names of its values.
+    LabelNames,
+    /// `embed.edits`: manual edits.
+    Edits,
+}
+
+impl SideFile {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Labels, Self::LabelNames, Self::Edits];
+
+    /// The name in provenance.
+    pub(crate) fn role(self) -> &'static str {
+        match self {
+            Self::Labels => "labels",
+            Self::LabelNames => "label_names",
+            Self::Edits => "edits",
+        }
+    }
+
+    /// The key in the config.
+    #[must_use]
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Labels => "tree.labels",
+            Self::LabelNames => "tree.label_names",
+            Self::Edits => "embed.edits",
+        }
+    }
+
+    /// The stage that reads it.
+    pub(crate) fn stage(self) -> Stage {
+        match self {
+            Self::Labels | Self::LabelNames => Stage::Tree,
+            Self::Edits => Stage::Embed,
+        }
+    }
+
+    /// Where the config has its path.
+    #[must_use]
+    pub fn slot(self, config: &mut Config) -> &mut Option<String> {
+        match self {
+            Self::Labels => &mut config.tree.labels,
+            Self::LabelNames => &mut config.tree.label_names,
+            Self::Edits => &mut config.embed.edits,
+        }
+    }
+
+    /// Its path as the config has it; none if the config names no such file.
+    pub(crate) fn path_in(self, config: &Config) -> Option<&str> {
+        let path = match self {
+            Self::Labels => &config.tree.labels,
+            Self::LabelNames => &config.tree.label_names,
+            Self::Edits => &config.embed.edits,
+        };
+        path.as_deref().filter(|path| !path.is_empty())
+    }
+}
