@@ -114,6 +114,8 @@ pub(crate) enum Command {
     Render(StageArguments),
     /// Check a run folder: digests, certificate, and every number computed again:  espalier verify RUN
     Verify(VerifyArguments),
+    /// The calibre on the way from the root to a place of a run:  espalier profile RUN --node N
+    Profile(ProfileArguments),
 }
 
 /// `espalier run`.
@@ -221,6 +223,50 @@ pub(crate) struct VerifyArguments {
     pub(crate) json: bool,
 }
 
+const PROFILE_HELP: &str = "\
+Prints the rows of profiles.tsv on the way from the root, each node once, with its point in RAS+ mm: path length, radius,
+the radius before and after, and by how much it falls short of that.
+
+Examples:
+  espalier profile out/airway --branch 17               to the end of a branch, as numbered in branches.tsv
+  espalier profile out/airway --node 138                to a node, such as a tip, as numbered in nodes.tsv
+  espalier profile out/airway --to=-32.7,-168.8,-161.8  to the node nearest to a point";
+
+/// `espalier profile`.
+#[derive(Debug, Args)]
+#[command(after_help = PROFILE_HELP)]
+pub(crate) struct ProfileArguments {
+    /// The run folder
+    #[arg(value_name = "RUN")]
+    pub(crate) folder: PathBuf,
+    #[command(flatten)]
+    pub(crate) place: PlaceArguments,
+}
+
+/// Where the way leads: one of these.
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+pub(crate) struct PlaceArguments {
+    /// To this node
+    #[arg(long, visible_alias = "tip", value_name = "N")]
+    pub(crate) node: Option<usize>,
+    /// To the end of this branch
+    #[arg(long, value_name = "N")]
+    pub(crate) branch: Option<usize>,
+    /// To the node nearest to this point, RAS+ mm
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
+    pub(crate) to: Option<[f64; 3]>,
+}
+
+fn parse_point(text: &str) -> Result<[f64; 3], String> {
+    let complaint = || "write X,Y,Z in mm, such as 12.5,-40,3".to_owned();
+    let numbers: Vec<f64> = text
+        .split(',')
+        .map(|part| part.trim().parse().ok().filter(|number: &f64| number.is_finite()).ok_or_else(complaint))
+        .collect::<Result<_, _>>()?;
+    numbers.try_into().map_err(|_| complaint())
+}
+
 fn parse_override(text: &str) -> Result<Override, String> {
     let (key, value) = text.split_once('=').ok_or("write KEY=VALUE, such as embed.w_angle=3")?;
     Ok(Override { key: key.trim().to_owned(), value: value.trim().to_owned() })
@@ -283,6 +329,14 @@ mod tests {
         assert_eq!(values("a=[1,2],[3,4]"), Ok(["[1,2]", "[3,4]"].map(str::to_owned).to_vec()));
         for text in ["embed.w_length", "embed.w_length=", "=1,2", "a=1,,2"] {
             assert!(values(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn points() {
+        assert_eq!(parse_point("1, -2.5,3e1"), Ok([1.0, -2.5, 30.0]));
+        for text in ["1,2", "1,2,3,4", "1,2,x", "1,2,inf", ""] {
+            assert!(parse_point(text).is_err(), "{text}");
         }
     }
 

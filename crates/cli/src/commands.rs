@@ -9,12 +9,12 @@ use espalier_model::Diagnose;
 use espalier_model::diagnose::Class;
 use espalier_pipeline::{
     Artifact, CompareRequest, Config, Error, Loaded, Override, Request, SideFile, Stage, Subject, Summary,
-    SweepRequest,
+    SweepRequest, WayTo,
 };
 
 use crate::args::{
-    Arguments, Command, CompareArguments, PhantomArguments, RunArguments, StageArguments, SweepArguments,
-    VerifyArguments,
+    Arguments, Command, CompareArguments, PhantomArguments, PlaceArguments, ProfileArguments, RunArguments,
+    StageArguments, SweepArguments, VerifyArguments,
 };
 use crate::checks;
 use crate::progress::{self, Progress};
@@ -37,6 +37,7 @@ pub(crate) fn execute(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Embed(stage) => run_stage(arguments, stage, Stage::Embed)?,
         Command::Render(stage) => run_stage(arguments, stage, Stage::Render)?,
         Command::Verify(verify) => return verify_folder(arguments, verify),
+        Command::Profile(profile) => return print_profile(profile),
     };
     for file in &summary.highlights {
         progress::result(&summary.out.join(file).display().to_string());
@@ -57,6 +58,16 @@ fn verify_folder(arguments: &Arguments, verify: &VerifyArguments) -> anyhow::Res
         progress::result(&format!("digest {}", verification.digest));
     }
     Ok(verification.verdict()?)
+}
+
+/// Prints the calibre on the way to a place.
+fn print_profile(profile: &ProfileArguments) -> anyhow::Result<()> {
+    let PlaceArguments { node, branch, to } = profile.place;
+    let to_point = to.map(|point| WayTo::Point(point.into()));
+    let way_to = node.map(WayTo::Node).or(branch.map(WayTo::Branch)).or(to_point);
+    let way_to = way_to.ok_or_else(|| anyhow!("say where to: --node, --branch or --to"))?;
+    progress::result(espalier_pipeline::profile(&profile.folder, way_to)?.trim_end());
+    Ok(())
 }
 
 /// Prints an error with its code and way out, and gives the exit code of its class.

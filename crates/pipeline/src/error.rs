@@ -107,6 +107,16 @@ pub enum Error {
         /// The first of them.
         first: String,
     },
+    /// A node or branch that the tree does not have.
+    #[error("there is no {what} {index}: the tree has {n_there}, counted from 0")]
+    NoSuchPlace {
+        /// `node` or `branch`.
+        what: &'static str,
+        /// The index asked for.
+        index: usize,
+        /// How many there are.
+        n_there: usize,
+    },
     /// A stage that this input does not pass through was asked for.
     #[error("--{flag} {stage}: a run from this input has no such stage; it has {available}")]
     NoSuchStage {
@@ -239,6 +249,7 @@ impl Diagnose for Error {
             Self::Config(error) => error.code(),
             Self::Stage { cause, .. } | Self::File { cause, .. } => cause.code(),
             Self::MissingArtifact { .. } => "E-RUN-MISSING-FILE",
+            Self::NoSuchPlace { .. } => "E-PROFILE-PLACE",
             Self::NoRun { .. } => "E-COMPARE-NO-RUN",
             Self::RunInTheWay { .. } => "E-COMPARE-FOLDER",
             Self::Settled { .. } => "E-COMPARE-SETTINGS",
@@ -264,6 +275,7 @@ impl Diagnose for Error {
             Self::Config(error) => error.class(),
             Self::Stage { cause, .. } | Self::File { cause, .. } => cause.class(),
             Self::NoSuchStage { .. }
+            | Self::NoSuchPlace { .. }
             | Self::EmptyRange { .. }
             | Self::Input { .. }
             | Self::OtherSettings { .. }
@@ -289,6 +301,7 @@ impl Diagnose for Error {
             Self::Stage { cause, .. } | Self::File { cause, .. } => cause.hint(),
             Self::Unverified { .. } => "use none of it; make it again with espalier run".to_owned(),
             Self::Certificate { .. } => "make the embedding again with espalier embed".to_owned(),
+            Self::NoSuchPlace { .. } => "branches.tsv has the branches, nodes.tsv the nodes".to_owned(),
             Self::NoRun { .. } => "run it with this version, at least up to --to embed".to_owned(),
             Self::RunInTheWay { .. } => "choose another folder with -o".to_owned(),
             Self::NotSwept { .. } => "write --over KEY=V1,V2,…, such as --over embed.w_length=0.5,1,2,4".to_owned(),

@@ -12,6 +12,7 @@
 //! | the run folder: atomic files, digests, one lock | `folder` |
 //! | how a result came about, what each method cost | `provenance`, `methods` |
 //! | what the columns of the tables mean | `dictionary` |
+//! | the calibre on the way to a place | [`profile()`] |
 //! | a run folder held against itself | [`verify()`] |
 //!
 //! **Architecture Invariant:** a stage is handed what its predecessor *wrote*, as it would be read back: a run
@@ -29,6 +30,7 @@ mod event;
 mod folder;
 mod methods;
 mod phantom;
+mod profile;
 mod provenance;
 pub mod run;
 mod settings;
@@ -45,6 +47,7 @@ pub use error::{Error, NotSwept};
 pub use espalier_verify::{Check, Outcome};
 pub use event::Event;
 pub use phantom::make_phantom;
+pub use profile::{WayTo, profile};
 pub use provenance::{input_of_run, side_file_of_run};
 pub use run::{Request, Summary, run};
 pub use settings::Difference;
