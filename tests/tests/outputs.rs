@@ -42,7 +42,8 @@ fn voxels(path: &Path) -> Vec<f64> {
 #[test]
 fn a_y_is_measured_and_its_voxels_shared_out() {
     let out = tempfile::tempdir().expect("a folder");
-    let tree = tree_run(&fixture("y.nii.gz"), out.path(), &[]);
+    // The stem comes from below.
+    let tree = tree_run(&fixture("y.nii.gz"), out.path(), &[set("tree.root_mm", "[0, 0, -24]")]);
     let lengths = numbers(out.path(), "branches.tsv", "length_mm");
     assert_eq!(lengths.len(), 3);
     assert!((lengths.iter().sum::<f64>() - tree.length_mm()).abs() < 1e-4 * tree.length_mm());
@@ -71,9 +72,10 @@ fn a_y_is_measured_and_its_voxels_shared_out() {
     }
 }
 
-/// A straight vessel along z whose radius falls from 4 mm to a narrow place in its middle and recovers.
+/// A straight vessel along z whose radius falls from 4 mm to a narrow place in its middle, 4 mm long, and recovers.
 fn narrowed(radius_mm: f64) -> Mask {
-    let radius_at = |z: f64| 4.0 - (4.0 - radius_mm) * (1.0 - (z - 30.0).abs() / 6.0).max(0.0);
+    let share = |z: f64| (1.0 - ((z - 30.0).abs() - 2.0).max(0.0) / 6.0).max(0.0);
+    let radius_at = |z: f64| 4.0 - (4.0 - radius_mm) * share(z);
     let node = |i: usize| Node {
         position_mm: DVec3::new(0.0, 0.0, i as f64),
         radius_mm: radius_at(i as f64),
@@ -95,9 +97,9 @@ fn a_planted_stenosis_is_found_where_it_is() {
         tree_run(&input, &out, &[set("tree.root", "superior")]);
         let found = numbers(&out, "stenoses.tsv", "narrowing_percent");
         assert_eq!(found.len(), 1, "{found:?}");
-        assert!((found[0] - percent).abs() < 6.0, "{found:?}, not {percent}");
+        assert!((found[0] - percent).abs() < 5.0, "{found:?}, not {percent}");
         let z = numbers(&out, "stenoses.tsv", "z_mm")[0];
-        assert!((z - 30.0).abs() < 1.5, "at {z}");
+        assert!((z - 30.0).abs() < 2.5, "at {z}");
 
         // It stands in the profile of the way to the tip as well.
         let way = profile(&out, WayTo::Branch(0)).expect("a profile");
