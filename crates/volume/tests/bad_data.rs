@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use espalier_geom::random::{Purpose, Stream};
 use espalier_model::Diagnose;
-use espalier_volume::{Error, ReadError, ReadOptions, read};
+use espalier_volume::{Error, Params, ReadError, ReadOptions, read, read_mask};
 
 /// Enough for every legal file of the data, too little for the bombs.
 const OPTIONS: ReadOptions = ReadOptions {
@@ -102,7 +102,64 @@ fn decompressed(bytes: &[u8]) -> Vec<u8> {
     plain
 }
 
-/// 1000 mutants each of a plain and a compressed file: none may panic, and none may yield more than the limit.
+/// The same numbers as text headers with raw, compressed and written-out data.
+fn text_files() -> [(&'static str, Vec<u8>); 5] {
+    let plain = decompressed(&small_file());
+    let raw = &plain[352..];
+    let written = raw.as_chunks::<2>().0.iter().map(|&pair| i16::from_le_bytes(pair).to_string());
+    let written = written.collect::<Vec<_>>().join(" ").into_bytes();
+    let packed = |zlib: bool| {
+        let (level, mut packed) = (flate2::Compression::fast(), Vec::new());
+        let mut gz = flate2::read::GzEncoder::new(raw, level);
+        let mut zl = flate2::read::ZlibEncoder::new(raw, level);
+        let source: &mut dyn std::io::Read = if zlib { &mut zl } else { &mut gz };
+        source.read_to_end(&mut packed).expect("to memory");
+        packed
+    };
+    let nrrd = |encoding: &str, data: &[u8]| {
+        let header = format!(
+            "NRRD0005\n# a comment\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: 9 8 7\n\
+             space directions: (0.5,0,0) (0,0.5,0) (0,0,2)\nkinds: domain domain domain\nendian: little\n\
+             encoding: {encoding}\nspace origin: (1,2,3)\nkey:=value\n\n"
+        );
+        [header.as_bytes(), data].concat()
+    };
+    let meta = |is_compressed: &str, data: &[u8]| {
+        let header = format!(
+            "ObjectType = Image\nNDims = 3\nBinaryData = True\nCompressedData = {is_compressed}\n\
+             TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 1 2 3\nElementSpacing = 0.5 0.5 2\nDimSize = 9 8 7\n\
+             ElementType = MET_SHORT\nElementDataFile = LOCAL\n"
+        );
+        [header.as_bytes(), data].concat()
+    };
+    [
+        ("raw.nrrd", nrrd("raw", raw)),
+        ("packed.nrrd", nrrd("gzip", &packed(false))),
+        ("written.nrrd", nrrd("ascii", &written)),
+        ("raw.mha", meta("False", raw)),
+        ("packed.mha", meta("True", &packed(true))),
+    ]
+}
+
+/// Text headers say the same as a binary one.
+#[test]
+fn formats_agree() {
+    let folder = scratch();
+    let expected = decompressed(&small_file())[352..].to_vec();
+    for (name, bytes) in text_files() {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).expect("writable");
+        let loaded = read(&path, &OPTIONS).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(loaded.volume.grid().orientation(), "LPS", "{name}");
+        assert_eq!(loaded.volume.grid().world_from_voxel().translation, glam::DVec3::new(-1.0, -2.0, 3.0));
+        let bytes: Vec<u8> =
+            loaded.volume.map_values(|v| (v as i16).to_le_bytes()).into_iter().flatten().collect();
+        assert_eq!(bytes, expected, "{name}");
+        assert!(loaded.report.warnings.is_empty(), "{name}: {:?}", loaded.report.warnings);
+    }
+}
+
+/// Hundreds of mutants of a file of each kind: none may panic, and none may yield more than the limit.
 #[test]
 fn mutants_never_panic() {
     let folder = scratch();
@@ -111,14 +168,17 @@ fn mutants_never_panic() {
     let options = ReadOptions { max_bytes: 1 << 20, ..OPTIONS };
     let mut stream = Stream::new(11, Purpose::Test, 0, 0);
     let (mut n_read, mut n_refused) = (0, 0);
-    for (name, original) in [("plain.nii", &plain), ("packed.nii.gz", &compressed)] {
+    let binary = [("plain.nii", plain), ("packed.nii.gz", compressed)];
+    for (name, original) in binary.into_iter().chain(text_files()) {
         let path = folder.path().join(name);
-        for _ in 0..1000 {
-            let mutant = mutate(original, &mut stream);
+        for _ in 0..400 {
+            let mutant = mutate(&original, &mut stream);
             std::fs::write(&path, &mutant).expect("writable");
+            let streamed = read_mask(&path, &options, &Params::default());
             match read(&path, &options) {
                 Ok(loaded) => {
                     n_read += 1;
+                    assert!(!matches!(streamed, Err(Error::Read { .. })), "read whole, but not as a mask");
                     assert!(loaded.volume.grid().n_voxels() <= 1 << 20);
                 }
                 Err(Error::Read { problem, .. }) => {
