@@ -1,6 +1,7 @@
 //! Helpers of the end-to-end suite.
 
 pub mod degenerate;
+pub mod ground_truth;
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};

@@ -25,10 +25,14 @@ pub enum LedgerKind {
     RootResolved,
     /// A radius that had to be repaired.
     RadiusRepaired,
+    /// An edge added between the tree and a component that was apart.
+    GapBridged,
+    /// The tip that became the root; the length is its lead over the next best.
+    RootChosen,
 }
 
 impl LedgerKind {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 10] = [
         Self::ComponentDropped,
         Self::TunnelClosed,
         Self::LoopCut,
@@ -37,6 +41,8 @@ impl LedgerKind {
         Self::NodesMerged,
         Self::RootResolved,
         Self::RadiusRepaired,
+        Self::GapBridged,
+        Self::RootChosen,
     ];
 
     /// The name used in `topology.tsv`.
@@ -51,6 +57,8 @@ impl LedgerKind {
             Self::NodesMerged => "nodes_merged",
             Self::RootResolved => "root_resolved",
             Self::RadiusRepaired => "radius_repaired",
+            Self::GapBridged => "gap_bridged",
+            Self::RootChosen => "root_chosen",
         }
     }
 }

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use espalier_embed::PoseMode;
 use espalier_model::table::{Column, Table, fixed};
 use espalier_model::{
-    Comparison, Embedding, Grid, GridError, InscribedSpheres, Ledger, Mask, MethodRow, Report, Termination,
-    Tree, ViewHierarchy, nifti_out, swc,
+    Comparison, Embedding, Grid, GridError, InscribedSpheres, Ledger, LedgerKind, Mask, MethodRow, Report,
+    Termination, Tree, ViewHierarchy, nifti_out, swc,
 };
 
 use crate::artifacts::{Artifacts, Lookup, SOURCE_KEY, SOURCE_SCAN, SOURCE_TRACING};
@@ -371,6 +371,8 @@ fn ledger_phrase(ledger: &Ledger) -> String {
     let mut kinds: Vec<_> = ledger.0.iter().map(|entry| entry.kind).collect();
     kinds.sort_unstable();
     kinds.dedup();
+    // There is always a root.
+    kinds.retain(|&kind| kind != LedgerKind::RootChosen);
     let phrases: Vec<String> = kinds
         .iter()
         .map(|kind| format!("{} {}", ledger.n_of(*kind), kind.name().replace('_', " ")))

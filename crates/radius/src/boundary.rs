@@ -1,21 +1,20 @@
 //! The background around a point: the distance at any point between voxels.
 //!
-//! **Input** the field and a point p on its ridge. **Output** the background centres that can be nearest to a point
+//! **Input** a mask's background and a point p. **Output** the background centres that can be nearest to a point
 //! within [`REACH`] of p, hence the distance there, and its maximum across the branch.
-//! **Steps** 1. In each row along x that is near enough, find the first background voxels to the left and to the
-//! right; the field itself says how far the row may be skipped. 2. Keep those not farther than the nearest plus
-//! twice the reach. 3. Maximise the least distance to them by a pattern search in the plane across the branch.
+//! **Steps** 1. In each row along x that is near enough, the words tell the first background voxels to the left and to
+//! the right, and all within the reach. 2. Keep those not farther than the nearest plus twice the reach. 3. Maximise the
+//! least distance to them by a pattern search in the plane across the branch.
 //! **Guarantees** the distance is exact within the reach.
-//! **Cost** O((r/s)²) look-ups for radius r at spacing s; a few dozen times the kept centres.
+//! **Cost** O((r/s)²) words for radius r at spacing s; a few dozen times the kept centres.
 
 use espalier_geom::space::plane_axes;
 use glam::DVec3;
 
-use crate::center::nearest_voxel;
-use crate::distance::DistanceField;
+use crate::nearest::{Background, zero_at_or_after, zero_at_or_before};
 
 /// How far from the point the distance is exact, in units of the largest spacing.
-const REACH: f64 = 0.75;
+pub(crate) const REACH: f64 = 0.75;
 /// Step lengths of the pattern search, in units of the spacing across.
 const STEPS: [f64; 4] = [0.4, 0.2, 0.1, 0.05];
 /// Moves at one step length.
@@ -28,37 +27,34 @@ pub(crate) struct Boundary {
 }
 
 impl Boundary {
-    /// The boundary as seen from `point`.
-    pub(crate) fn around(field: &DistanceField, point: DVec3) -> Self {
-        let spacing = field.spacing_mm();
-        let voxel = nearest_voxel(field, point);
+    /// The boundary as seen from `point`, whose own distance is `distance_mm`.
+    pub(crate) fn around(background: Background<'_>, point: DVec3, distance_mm: f64) -> Self {
+        let spacing = background.spacing_mm();
         let reach = REACH * spacing.max_element();
-        // |site − voxel| ≤ D(voxel) + 2·|q − voxel| for the site nearest to any q within reach.
-        let radius = field.distance_mm(voxel) + 2.0 * (reach + point.distance(field.position_mm(voxel)));
         let mut boundary = Self { sites: Vec::new(), spacing };
+        // |site − p| ≤ D(p) + 2·|q − p| for the site nearest to any q within reach.
+        let radius = distance_mm + 2.0 * reach;
         if radius.is_finite() {
-            boundary.gather(field, voxel, radius);
-            let farthest = boundary.distance_mm(point) + 2.0 * reach;
-            boundary.sites.retain(|site| site.distance_squared(point) <= farthest * farthest);
+            boundary.gather(background, point, radius);
         }
         boundary
     }
 
-    /// Gathers the innermost background centres of the rows that come within `radius` of `voxel`.
-    fn gather(&mut self, field: &DistanceField, voxel: [i64; 3], radius: f64) {
-        let (spacing, center) = (field.spacing_mm(), field.position_mm(voxel));
-        let [_, ny, nz] = (radius / spacing).to_array().map(|n| n as i64);
-        for z in voxel[2] - nz..=voxel[2] + nz {
-            for y in voxel[1] - ny..=voxel[1] + ny {
-                let row = [voxel[0], y, z];
-                let along_squared = radius * radius - field.position_mm(row).distance_squared(center);
-                if along_squared >= 0.0 {
-                    let n_steps = (along_squared.sqrt() / spacing.x) as i64;
-                    let reach_steps = (REACH * spacing.max_element() / spacing.x) as i64 + 1;
-                    visit_row(field, row, [n_steps, reach_steps], |site| {
-                        self.sites.push(field.position_mm(site));
-                    });
-                }
+    /// Gathers the innermost background centres of the rows that come within `radius` of `point`.
+    fn gather(&mut self, background: Background<'_>, point: DVec3, radius: f64) {
+        let spacing = background.spacing_mm();
+        let reach_steps = REACH * spacing.max_element() / spacing.x;
+        let low = ((point - radius) / spacing).ceil().to_array().map(|c| c as i64);
+        let high = ((point + radius) / spacing).floor().to_array().map(|c| c as i64);
+        for z in low[2]..=high[2] {
+            for y in low[1]..=high[1] {
+                let across = DVec3::new(0.0, y as f64, z as f64) * spacing - point.with_x(0.0);
+                let along_squared = radius * radius - across.length_squared();
+                let Some(words) = background.row(y, z).filter(|_| along_squared >= 0.0) else { continue };
+                let steps = [reach_steps, along_squared.sqrt() / spacing.x];
+                visit_row(words, background.n_columns(), point.x / spacing.x, steps, |x| {
+                    self.sites.push(DVec3::new(x as f64, y as f64, z as f64) * spacing);
+                });
             }
         }
     }
@@ -106,29 +102,25 @@ impl Boundary {
     }
 }
 
-/// Visits the background voxels of a row within `reach_steps`, and the first on each side beyond, not more than
-/// `n_steps` away.
-fn visit_row(
-    field: &DistanceField,
-    row: [i64; 3],
-    [n_steps, reach_steps]: [i64; 2],
-    mut visit: impl FnMut([i64; 3]),
-) {
-    for (sign, first) in [(-1, 0), (1, 1)] {
-        let mut step = first;
-        while step <= n_steps {
-            let voxel = [row[0] + sign * step, row[1], row[2]];
-            let distance = field.distance_mm(voxel);
-            // A foreground voxel has no background within its distance, in its row neither.
-            step += ((distance / field.spacing_mm().x) as i64).max(1);
-            if distance == 0.0 {
-                if field.is_background(voxel) {
-                    visit(voxel);
-                }
-                if step > reach_steps {
-                    break;
-                }
-            }
+/// Visits the background voxels of a row of `n` within `reach` voxels of `center`, and the first on each side beyond, not
+/// more than `limit` away.
+fn visit_row(words: &[u64], n: usize, center: f64, [reach, limit]: [f64; 2], mut visit: impl FnMut(usize)) {
+    let last = n - 1;
+    let mut right = Some((center.ceil().max(0.0) as usize).min(last));
+    while let Some(x) = right.and_then(|x| zero_at_or_after(words, x, n)) {
+        if x as f64 - center > limit {
+            break;
         }
+        visit(x);
+        right = (x as f64 - center <= reach && x < last).then_some(x + 1);
+    }
+    let first_left = center.ceil() - 1.0;
+    let mut left = (first_left >= 0.0).then_some((first_left as usize).min(last));
+    while let Some(x) = left.and_then(|x| zero_at_or_before(words, x)) {
+        if center - x as f64 > limit {
+            break;
+        }
+        visit(x);
+        left = if center - x as f64 <= reach { x.checked_sub(1) } else { None };
     }
 }

@@ -28,8 +28,6 @@ pub struct DistanceField {
     low: [usize; 3],
     /// Extents of the box.
     shape: [usize; 3],
-    /// Extents of the scan.
-    scan_shape: [usize; 3],
     spacing_mm: DVec3,
     /// Squared distance in mm², x fastest; 0 for background, infinite where a mask has no background at all.
     squared: Vec<f64>,
@@ -47,14 +45,14 @@ pub struct DistanceField {
 #[must_use]
 pub fn distance_field(mask: &Mask) -> DistanceField {
     let grid = mask.grid();
-    let (scan_shape, spacing_mm) = (grid.shape(), grid.spacing_mm());
+    let spacing_mm = grid.spacing_mm();
     let Some((first, last)) = mask.bounding_box() else {
-        return DistanceField { low: [0; 3], shape: [0; 3], scan_shape, spacing_mm, squared: Vec::new() };
+        return DistanceField { low: [0; 3], shape: [0; 3], spacing_mm, squared: Vec::new() };
     };
     let low = first.map(|c| c.saturating_sub(1));
     let shape = [0, 1, 2].map(|axis| (last[axis] + 2).min(grid.shape()[axis]) - low[axis]);
     let squared = vec![0.0; shape[0] * shape[1] * shape[2]];
-    let mut field = DistanceField { low, shape, scan_shape, spacing_mm, squared };
+    let mut field = DistanceField { low, shape, spacing_mm, squared };
 
     let foreground = field.foreground(mask);
     for &cell in &foreground {
@@ -74,28 +72,6 @@ impl DistanceField {
         self.cell(voxel).map_or(0.0, |cell| self.squared[cell].sqrt())
     }
 
-    /// The largest distance among the 27 voxels about `voxel`, in mm.
-    #[must_use]
-    pub fn neighborhood_max_mm(&self, [x, y, z]: [i64; 3]) -> f64 {
-        neighborhood().map(|[dx, dy, dz]| self.distance_mm([x + dx, y + dy, z + dz])).fold(0.0, f64::max)
-    }
-
-    /// The distance between neighbouring voxels, in mm.
-    pub(crate) fn spacing_mm(&self) -> DVec3 {
-        self.spacing_mm
-    }
-
-    /// A voxel's centre in grid mm.
-    pub(crate) fn position_mm(&self, voxel: [i64; 3]) -> DVec3 {
-        DVec3::from_array(voxel.map(|c| c as f64)) * self.spacing_mm
-    }
-
-    /// Whether a voxel is background of the scan; voxels outside the scan are not.
-    pub(crate) fn is_background(&self, voxel: [i64; 3]) -> bool {
-        let is_in_scan = (0..3).all(|axis| (0..self.scan_shape[axis] as i64).contains(&voxel[axis]));
-        is_in_scan && self.cell(voxel).is_none_or(|cell| self.squared[cell] == 0.0)
-    }
-
     fn cell(&self, voxel: [i64; 3]) -> Option<usize> {
         let mut at = [0; 3];
         for axis in 0..3 {
@@ -109,7 +85,7 @@ impl DistanceField {
     fn foreground(&self, mask: &Mask) -> Vec<usize> {
         let [nx, ny, nz] = self.shape;
         let rows = (0..ny * nz).into_par_iter().map(|row| {
-            let scan_row = (self.low[2] + row / ny) * self.scan_shape[1] + self.low[1] + row % ny;
+            let scan_row = (self.low[2] + row / ny) * mask.grid().shape()[1] + self.low[1] + row % ny;
             let cells = |run: Range<usize>| run.map(move |x| row * nx + x - self.low[0]);
             mask.bits().runs(scan_row).flat_map(cells).collect::<Vec<_>>()
         });
@@ -159,11 +135,6 @@ impl DistanceField {
         heights.extend(run.take_while(|&height| height != 0.0));
         heights.len() < limit
     }
-}
-
-/// The 27 offsets of a neighbourhood, z slowest.
-pub(crate) fn neighborhood() -> impl Iterator<Item = [i64; 3]> {
-    (0..27).map(|bit| [bit % 3 - 1, bit / 3 % 3 - 1, bit / 9 - 1])
 }
 
 /// A lower envelope of parabolas, kept between runs to save allocations.

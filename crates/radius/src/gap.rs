@@ -1,18 +1,18 @@
 //! The gap between the last voxels inside and the first outside.
 //!
 //! **Input** a point p on the ridge, the direction t there, the distance D from p to the nearest background centre.
-//! **Output** the radius in mm. **Notation** ρ the distance of a voxel centre from the axis through p along t.
+//! **Output** the gap's width in mm. **Notation** ρ the distance of a voxel centre from the axis through p along t.
 //! **Steps** 1. Among the voxels in the slab about p across t, as thick as the grid is along t, find the largest
-//! ρ < D; all of these are foreground, so the wall lies between it and D. 2. The radius is the middle.
-//! **Guarantees** at most half the largest spacing below D. On dense sections the gap is near 0 and the radius D; where
-//! the axis runs along the grid, a section has few different ρ, and D alone overshoots by up to half a voxel
-//! (radius 3 between voxels: the nearest background lies at 3.54).
+//! ρ < D; all of these are foreground, so the wall lies between it and D.
+//! **Guarantees** at most the largest spacing. On dense sections the gap is near 0; where the axis runs along the grid, a
+//! section has few different ρ, and D alone overshoots by up to half a voxel (radius 3 between voxels: the nearest
+//! background lies at 3.54).
 //! **Cost** O((D/s)²).
 
 use glam::DVec3;
 
-/// The radius of a tube through `point` along `tangent` whose nearest background centre is `distance_mm` away.
-pub(crate) fn radius_in_gap(point: DVec3, tangent: DVec3, distance_mm: f64, spacing: DVec3) -> f64 {
+/// The gap of a tube through `point` along `tangent` whose nearest background centre is `distance_mm` away.
+pub(crate) fn gap_mm(point: DVec3, tangent: DVec3, distance_mm: f64, spacing: DVec3) -> f64 {
     let half_slab = 0.5 * (tangent * spacing).length();
     let low = ((point - distance_mm) / spacing).ceil().to_array().map(|c| c as i64);
     let high = ((point + distance_mm) / spacing).floor().to_array().map(|c| c as i64);
@@ -38,8 +38,7 @@ pub(crate) fn radius_in_gap(point: DVec3, tangent: DVec3, distance_mm: f64, spac
             }
         }
     }
-    let gap = (distance_mm - inner_squared.sqrt()).min(spacing.max_element());
-    distance_mm - 0.5 * gap
+    (distance_mm - inner_squared.sqrt()).min(spacing.max_element())
 }
 
 fn largest_axis(v: DVec3) -> usize {

@@ -2,25 +2,27 @@
 //!
 //! | step | file | what |
 //! |--:|---|---|
-//! | 1 | `distance` | exact anisotropic distance of each foreground voxel to the background |
+//! | 1 | `nearest` | exact anisotropic distance of any place to the background, from the mask's bits |
 //! | 2 | `tangent` | which way the skeleton runs at each of its voxels |
-//! | 3 | `center` | from the voxel up to the ridge of the distance field, across the branch only |
-//! | 4 | `boundary` | the background centres around it: the distance at any point between voxels |
-//! | 5 | `gap` | the wall lies between the last voxels inside and the first outside |
-//! | 6 | `section` | area of the mask's cross-section there |
+//! | 3 | `ridge` | from the voxel to the axis of the branch, and the radius there |
+//! | 4 | `section` | area and centroid of the mask's cross-section |
+//! | 5 | `boundary` | where the section is not round: the ridge of the distance between voxels |
+//! | 6 | `gap` | the wall lies between the last voxels inside and the first outside |
+//! | – | `distance` | the distance of every foreground voxel, for those who ask for the whole field |
 //!
 //! **Spaces** inside this crate points are *grid mm*: voxel coordinates times spacing. Spheres come out in RAS+ mm.
 
 mod boundary;
-mod center;
 mod distance;
 mod error;
 mod gap;
+mod nearest;
 mod params;
+mod ridge;
 mod section;
 mod tangent;
 
-use espalier_model::{Grid, InscribedSpheres, Mask, Report, Skeleton, Sphere};
+use espalier_model::{InscribedSpheres, Mask, Report, Skeleton, Sphere};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -28,7 +30,8 @@ pub use distance::{DistanceField, distance_field};
 pub use error::Error;
 pub use params::{Params, Rule};
 
-use boundary::Boundary;
+use nearest::Background;
+use ridge::OnAxis;
 
 /// The inscribed spheres of a skeleton and what their making did.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,13 +50,13 @@ pub struct Measured {
 /// at the first skeleton voxel that is background.
 pub fn inscribed_spheres(mask: &Mask, skeleton: &Skeleton, params: &Params) -> Result<Measured, Error> {
     check(mask, skeleton)?;
-    let field = distance_field(mask);
-    let tangents = tangent::tangents(skeleton, &field);
-    let spheres: Vec<Sphere> = skeleton
-        .voxels()
-        .par_iter()
-        .zip(&tangents)
-        .map(|(&voxel, &tangent)| measure(mask, &field, voxel, tangent, params))
+    let background = Background::of(mask);
+    let distance_mm = |voxel: &[u32; 3]| background.distance_mm(voxel.map(i64::from));
+    let distances_mm: Vec<f64> = skeleton.voxels().par_iter().map(distance_mm).collect();
+    let tangents = tangent::tangents(skeleton, &distances_mm);
+    let spheres: Vec<Sphere> = (0..skeleton.voxels().len())
+        .into_par_iter()
+        .map(|i| measure(mask, skeleton.voxels()[i], (distances_mm[i], tangents[i]), params))
         .collect();
     let report = report(skeleton, &spheres);
     Ok(Measured { spheres: InscribedSpheres(spheres), report })
@@ -72,71 +75,40 @@ fn check(mask: &Mask, skeleton: &Skeleton) -> Result<(), Error> {
     }
 }
 
-/// The sphere of one skeleton voxel.
+/// The sphere of one skeleton voxel, whose own distance and direction are known.
 fn measure(
     mask: &Mask,
-    field: &DistanceField,
     voxel: [u32; 3],
-    tangent: Option<DVec3>,
+    (distance_mm, tangent): (f64, Option<DVec3>),
     params: &Params,
 ) -> Sphere {
-    let grid = mask.grid();
-    let spacing = grid.spacing_mm();
-    let last_mm = DVec3::from_array(grid.shape().map(|n| (n - 1) as f64)) * spacing;
+    let background = Background::of(mask);
     let voxel = voxel.map(i64::from);
-    let (center, distance_mm) = match params.rule {
-        Rule::Voxel => (field.position_mm(voxel), field.distance_mm(voxel)),
-        Rule::NeighborhoodMax => {
-            (center::on_ridge(field, voxel, tangent, params.climb_steps), field.neighborhood_max_mm(voxel))
+    let OnAxis { center, radius_mm, section } = match params.rule {
+        Rule::Voxel => {
+            let center = background.position_mm(voxel);
+            let section =
+                tangent.and_then(|tangent| section::through(background, center, tangent, distance_mm));
+            OnAxis { center, radius_mm: distance_mm, section }
         }
-        Rule::Ridge => on_ridge_between_voxels(field, voxel, tangent, params.climb_steps, last_mm),
+        Rule::NeighborhoodMax => OnAxis {
+            radius_mm: background.neighborhood_max_mm(voxel),
+            ..ridge::on_axis(background, voxel, (distance_mm, tangent), params.climb_steps)
+        },
+        Rule::Ridge => ridge::on_axis(background, voxel, (distance_mm, tangent), params.climb_steps),
     };
-    // Where the border cuts the organ lengthwise, its ridge may lie outside of what was scanned.
-    let center = center.clamp(DVec3::ZERO, last_mm);
-    let border_mm = distance_to_border(grid, center);
+    let border_mm = background.border_mm(center);
     // Without any background the border of the scan is all there is to measure.
     let known = |distance_mm: f64| if distance_mm.is_finite() { distance_mm } else { border_mm };
-    let radius_mm = (known(distance_mm) + params.offset_voxels * spacing.min_element()).max(0.0);
+    let offset_mm = params.offset_voxels * background.spacing_mm().min_element();
+    let radius_mm = (known(radius_mm) + offset_mm).max(0.0);
     Sphere {
-        center_mm: grid.world_from_voxel().transform_point3(center / spacing),
+        center_mm: mask.grid().world_from_voxel().transform_point3(center / background.spacing_mm()),
         radius_mm,
-        distance_mm: known(field.distance_mm(voxel)),
-        area_radius_mm: tangent
-            .and_then(|tangent| section::area_radius_mm(mask, center, tangent, radius_mm))
-            .unwrap_or(f64::NAN),
+        distance_mm: known(distance_mm),
+        area_radius_mm: section.map_or(f64::NAN, |section| section.area_radius_mm),
         is_cut: border_mm < radius_mm,
     }
-}
-
-/// Centre and radius by [`Rule::Ridge`], within the box from the first to the last voxel at `last_mm`.
-fn on_ridge_between_voxels(
-    field: &DistanceField,
-    voxel: [i64; 3],
-    tangent: Option<DVec3>,
-    climb_steps: u32,
-    last_mm: DVec3,
-) -> (DVec3, f64) {
-    let start = center::on_ridge(field, voxel, tangent, climb_steps).clamp(DVec3::ZERO, last_mm);
-    let (mut center, mut distance_mm) = Boundary::around(field, start).highest_near(start, tangent, last_mm);
-    if distance_mm < field.distance_mm(voxel) {
-        // In branches of one or two voxels the weighted centroid can lie nearer to the wall than the voxel.
-        let start = field.position_mm(voxel);
-        (center, distance_mm) = Boundary::around(field, start).highest_near(start, tangent, last_mm);
-    }
-    match tangent {
-        Some(tangent) if distance_mm.is_finite() => {
-            (center, gap::radius_in_gap(center, tangent, distance_mm, field.spacing_mm()))
-        }
-        _ => (center, distance_mm),
-    }
-}
-
-/// The distance from a point to the outer faces of the scan, in mm.
-fn distance_to_border(grid: &Grid, point: DVec3) -> f64 {
-    let spacing = grid.spacing_mm();
-    let extent = DVec3::from_array(grid.shape().map(|n| n as f64)) * spacing;
-    let from_low = point + 0.5 * spacing;
-    from_low.min(extent - from_low).min_element()
 }
 
 fn report(skeleton: &Skeleton, spheres: &[Sphere]) -> Report {

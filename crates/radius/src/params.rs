@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 pub struct Params {
     /// Where the distance is read. Default `ridge`.
     pub rule: Rule,
-    /// How many voxels a centre may climb from its skeleton voxel to the ridge, 0–10. Default 3: thinning leaves
+    /// How many times a centre may climb by three quarters of a voxel towards the ridge after the first, where the
+    /// section is not round, 0–10. Default 3: thinning leaves
     /// the skeleton at most two or three voxels off the axis. Larger values only help masks with very uneven
     /// walls.
     pub climb_steps: u32,
@@ -23,7 +24,8 @@ pub struct Params {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rule {
-    /// On the ridge of the distance between voxels, across the branch.
+    /// On the axis: where the cross-section is round, its centroid and the radius of the circle of its area;
+    /// elsewhere the ridge of the distance between voxels, across the branch.
     #[default]
     Ridge,
     /// The largest distance among the 27 voxels about the skeleton voxel.

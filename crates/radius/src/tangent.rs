@@ -1,6 +1,6 @@
 //! Which way the skeleton runs.
 //!
-//! **Input** a skeleton and the distance field. **Output** a unit vector in grid mm at each voxel, or none where
+//! **Input** a skeleton and the distance at each of its voxels. **Output** a unit vector in grid mm at each voxel, or none where
 //! branches meet or the skeleton has no direction.
 //! **Steps** 1. Gather the skeleton voxels that are connected to the voxel within a window of its own distance,
 //! at least [`MIN_WINDOW`] of the largest spacing. 2. Their principal axis about their mean is the direction, if it
@@ -10,8 +10,6 @@
 use espalier_model::Skeleton;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
-
-use crate::distance::{DistanceField, neighborhood};
 
 /// The window in units of the largest spacing: shorter ones see the staircase of the voxels, not the branch.
 const MIN_WINDOW: f64 = 3.0;
@@ -25,15 +23,17 @@ const MIN_SHARE: f64 = 0.65;
 const N_SQUARINGS: usize = 6;
 
 /// The direction at each skeleton voxel.
-pub(crate) fn tangents(skeleton: &Skeleton, field: &DistanceField) -> Vec<Option<DVec3>> {
+pub(crate) fn tangents(skeleton: &Skeleton, distances_mm: &[f64]) -> Vec<Option<DVec3>> {
     let voxels = skeleton.voxels();
     let neighbors: Vec<Vec<usize>> = voxels.par_iter().map(|&voxel| neighbors_of(voxels, voxel)).collect();
-    let positions: Vec<DVec3> = voxels.iter().map(|&voxel| field.position_mm(voxel.map(i64::from))).collect();
+    let spacing = skeleton.grid().spacing_mm();
+    let positions: Vec<DVec3> =
+        voxels.iter().map(|voxel| DVec3::from_array(voxel.map(f64::from)) * spacing).collect();
     (0..voxels.len())
         .into_par_iter()
         .map(|start| {
-            let distance = field.distance_mm(voxels[start].map(i64::from)).min(1e9);
-            let unit = field.spacing_mm().max_element();
+            let distance = distances_mm[start].min(1e9);
+            let unit = spacing.max_element();
             let window = (WINDOW_PER_DISTANCE * distance).clamp(MIN_WINDOW * unit, MAX_WINDOW * unit);
             let points = connected_within(start, window, &neighbors, &positions);
             principal_axis(&points)
@@ -42,16 +42,19 @@ pub(crate) fn tangents(skeleton: &Skeleton, field: &DistanceField) -> Vec<Option
 }
 
 /// The indices of the 26-neighbours of a voxel in the sorted voxel list.
-fn neighbors_of(voxels: &[[u32; 3]], [x, y, z]: [u32; 3]) -> Vec<usize> {
-    let key = |&[x, y, z]: &[u32; 3]| [z, y, x];
-    neighborhood()
-        .filter(|offset| *offset != [0; 3])
-        .filter_map(|[dx, dy, dz]| {
-            let at = |c: u32, d: i64| u32::try_from(i64::from(c) + d).ok();
-            let neighbor = [at(x, dx)?, at(y, dy)?, at(z, dz)?];
-            voxels.binary_search_by_key(&key(&neighbor), key).ok()
-        })
-        .collect()
+fn neighbors_of(voxels: &[[u32; 3]], voxel: [u32; 3]) -> Vec<usize> {
+    let [x, y, z] = voxel;
+    let mut neighbors = Vec::new();
+    for i in 0..9 {
+        // Of a row, at most three voxels in turn. The wrapped coordinates of a row outside the grid match none.
+        let row = (z.wrapping_add(i / 3).wrapping_sub(1), y.wrapping_add(i % 3).wrapping_sub(1));
+        let start = (row.0, row.1, x.saturating_sub(1));
+        let first = voxels.partition_point(|&[x, y, z]| (z, y, x) < start);
+        let is_near = |near: &&[u32; 3]| (near[2], near[1]) == row && near[0] <= x + 1;
+        let n_near = voxels[first..].iter().take_while(is_near).count();
+        neighbors.extend((first..first + n_near).filter(|&idx| voxels[idx] != voxel));
+    }
+    neighbors
 }
 
 /// The positions of the voxels that a walk from `start` reaches without leaving a ball about it.

@@ -7,8 +7,8 @@
 )]
 
 use espalier_geom::random::{Purpose, Stream};
-use espalier_model::{Grid, Mask};
-use espalier_radius::distance_field;
+use espalier_model::{Grid, Mask, Skeleton};
+use espalier_radius::{Params, Rule, distance_field, inscribed_spheres};
 use glam::DVec3;
 
 /// The nearest background centre among all of them.
@@ -38,6 +38,26 @@ fn check(mask: &Mask, name: &str) {
         );
     }
     assert_eq!(field.distance_mm([-1, 0, 0]), 0.0, "{name}: outside the scan");
+
+    // What the bits say about each foreground voxel, taken for a skeleton.
+    let voxels: Vec<[u32; 3]> = mask.voxels().map(|voxel| voxel.map(|c| c as u32)).collect();
+    if voxels.is_empty() || voxels.len() == mask.grid().n_voxels() {
+        return;
+    }
+    let skeleton = Skeleton::new(mask.grid().clone(), voxels.clone());
+    for rule in [Rule::Voxel, Rule::NeighborhoodMax] {
+        let params = Params { rule, ..Params::default() };
+        let spheres = inscribed_spheres(mask, &skeleton, &params).expect("spheres").spheres;
+        for (voxel, sphere) in voxels.iter().zip(&spheres.0) {
+            let voxel = voxel.map(i64::from);
+            let around = (0..27).map(|i| [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1]);
+            let largest = around
+                .map(|offset| field.distance_mm([0, 1, 2].map(|axis| voxel[axis] + offset[axis])))
+                .fold(0.0, f64::max);
+            let expected = if rule == Rule::Voxel { field.distance_mm(voxel) } else { largest };
+            assert!((sphere.radius_mm - expected).abs() < 1e-6, "{name} {voxel:?}: {sphere:?}, {expected}");
+        }
+    }
 }
 
 #[test]

@@ -42,6 +42,9 @@ impl Errors {
         for sphere in &spheres.0 {
             let Some(off_axis) = off_axis(sphere.center_mm) else { continue };
             let error = sphere.radius_mm - radius;
+            if error.abs() > 0.5 {
+                println!("{sphere:?} off {off_axis} r {radius}");
+            }
             self.n += 1.0;
             self.bias += error;
             self.mean_absolute += error.abs();

@@ -1,15 +1,19 @@
-//! One component of the graph is the tree; the others go.
+//! One component of the graph is the tree; the others are joined to it or go.
 //!
-//! **Input** [`Graph`]. **Output** the graph of its longest component; a ledger entry for each other one, at its
-//! thickest hub.
+//! **Input** [`Graph`]. **Output** the graph of its longest component and of those joined to it; a ledger entry for each
+//! bridge, and for each component dropped, at its thickest hub.
+//! **Policies** `join`: over gaps of at most `bridge_mm` and of the island's own length, since a bridge longer than what it
+//! leads to explains nothing; `all`: over any gap; `largest`: none; `refuse`: an error if there are several. An
+//! island that is no longer than a spur at its own radius is never joined: it is noise, and would be pruned.
 //! **Why length**, not voxels or volume? Voxel counts depend on the direction of thick slices, and a volume would
 //! prefer one blob to a whole vessel tree. Ties: the component with the lower hub index.
-//! **Cost** O(N α(N)).
+//! **Cost** O(N α(N)), and what [`bridges`] takes.
 
 use espalier_geom::union_find::UnionFind;
 use espalier_model::{Ledger, LedgerEntry, LedgerKind};
 
 use crate::Error;
+use crate::bridges::{self, Island};
 use crate::graph::{Graph, Hub, Piece};
 use crate::params::{Components, Params};
 
@@ -19,23 +23,23 @@ struct Component {
     thickest: Hub,
 }
 
-/// Keeps the component that the policy names; also returns how many were dropped.
+/// Keeps what the policy names.
 ///
 /// # Errors
 /// [`Error::Components`] if there are several and the policy is to refuse them.
-pub(crate) fn select(graph: Graph, params: &Params, ledger: &mut Ledger) -> Result<(Graph, usize), Error> {
+pub(crate) fn select(mut graph: Graph, params: &Params, ledger: &mut Ledger) -> Result<Graph, Error> {
     let mut sets = UnionFind::new(graph.hubs.len());
     for piece in &graph.pieces {
         sets.join(piece.ends[0], piece.ends[1]);
     }
-    let component_of: Vec<usize> = (0..graph.hubs.len()).map(|hub| sets.find(hub)).collect();
+    let mut component_of: Vec<usize> = (0..graph.hubs.len()).map(|hub| sets.find(hub)).collect();
     let components = measure(&graph, &component_of);
 
     let mut by_length: Vec<usize> = (0..graph.hubs.len()).filter(|&hub| components[hub].is_some()).collect();
     let length = |hub: &usize| components[*hub].as_ref().map_or(0.0, |c| c.length_mm);
     by_length.sort_by(|a, b| length(b).total_cmp(&length(a)).then(a.cmp(b)));
     let kept = by_length[0];
-    let Some(second) = by_length.get(1) else { return Ok((graph, 0)) };
+    let Some(second) = by_length.get(1) else { return Ok(graph) };
     if let (Components::Refuse, Some(component)) = (params.components, &components[*second]) {
         return Err(Error::Components {
             n_components: by_length.len(),
@@ -44,21 +48,49 @@ pub(crate) fn select(graph: Graph, params: &Params, ledger: &mut Ledger) -> Resu
         });
     }
 
-    for component in by_length[1..].iter().filter_map(|&hub| components[hub].as_ref()) {
-        ledger.0.push(LedgerEntry {
-            kind: LedgerKind::ComponentDropped,
-            position_mm: component.thickest.sample.position_mm,
-            radius_mm: component.thickest.sample.radius_mm,
-            length_mm: component.length_mm,
-            reason: format!(
-                "island of {} tips and junctions, {:.3} mm long; the component kept is {:.3} mm long",
-                component.n_hubs,
-                component.length_mm,
-                length(&kept)
-            ),
-        });
+    let islands: Vec<Island> = by_length[1..]
+        .iter()
+        .filter_map(|&hub| joinable(hub, components[hub].as_ref()?, params))
+        .take(bridges::MAX_ISLANDS)
+        .collect();
+    let joined = bridges::join(&mut graph, &component_of, kept, &islands, ledger);
+    let mut is_kept = vec![false; component_of.len()];
+    for component in joined.into_iter().chain([kept]) {
+        is_kept[component] = true;
     }
-    Ok((restrict(graph, &component_of, kept), by_length.len() - 1))
+    for (hub, component) in by_length.iter().filter_map(|&hub| Some((hub, components[hub].as_ref()?))) {
+        if !is_kept[hub] {
+            ledger.0.push(dropped(component, length(&kept)));
+        }
+    }
+    // Hubs that bridges added belong to what is kept.
+    component_of.resize(graph.hubs.len(), kept);
+    Ok(restrict(graph, |hub| is_kept[component_of[hub]]))
+}
+
+/// The island that a component is, if the policy may join it.
+fn joinable(component: usize, measured: &Component, params: &Params) -> Option<Island> {
+    let length_mm = measured.length_mm;
+    let max_gap_mm = match params.components {
+        Components::Join => params.bridge_mm.min(length_mm),
+        Components::All => f64::INFINITY,
+        Components::Largest | Components::Refuse => return None,
+    };
+    let spur_mm = (params.prune_factor * measured.thickest.sample.radius_mm).max(params.prune_min_mm);
+    (length_mm > spur_mm).then_some(Island { component, length_mm, max_gap_mm })
+}
+
+fn dropped(component: &Component, kept_mm: f64) -> LedgerEntry {
+    LedgerEntry {
+        kind: LedgerKind::ComponentDropped,
+        position_mm: component.thickest.sample.position_mm,
+        radius_mm: component.thickest.sample.radius_mm,
+        length_mm: component.length_mm,
+        reason: format!(
+            "island of {} tips and junctions, {:.3} mm long; the largest component is {kept_mm:.3} mm long",
+            component.n_hubs, component.length_mm
+        ),
+    }
 }
 
 /// Each component under the index of the hub that stands for it.
@@ -80,12 +112,12 @@ fn measure(graph: &Graph, component_of: &[usize]) -> Vec<Option<Component>> {
     components
 }
 
-/// The part of the graph whose hubs belong to `kept`.
-fn restrict(graph: Graph, component_of: &[usize], kept: usize) -> Graph {
+/// The part of the graph whose hubs are kept.
+fn restrict(graph: Graph, is_kept: impl Fn(usize) -> bool) -> Graph {
     let mut new_index = vec![usize::MAX; graph.hubs.len()];
     let mut hubs = Vec::new();
     for (hub_idx, hub) in graph.hubs.into_iter().enumerate() {
-        if component_of[hub_idx] == kept {
+        if is_kept(hub_idx) {
             new_index[hub_idx] = hubs.len();
             hubs.push(hub);
         }
@@ -93,7 +125,7 @@ fn restrict(graph: Graph, component_of: &[usize], kept: usize) -> Graph {
     let pieces = graph
         .pieces
         .into_iter()
-        .filter(|piece| component_of[piece.ends[0]] == kept)
+        .filter(|piece| is_kept(piece.ends[0]))
         .map(|piece| Piece { ends: piece.ends.map(|end| new_index[end]), ..piece })
         .collect();
     Graph { hubs, pieces }

@@ -3,7 +3,7 @@
 //! | step | file | what happens |
 //! |--:|---|---|
 //! | 1 | `adjacency`, `graph` | 26-neighbours; junction clusters become one hub, chains become pieces |
-//! | 2 | `components` | one component is the tree |
+//! | 2 | `components`, `bridges` | the largest component is the tree; short gaps to islands are bridged |
 //! | 3 | `loops` | every loop is opened at its thinnest place |
 //! | 4 | `living`, `prune`, `redundant`, `root` | spurs go, the root is chosen |
 //! | 5 | `outline` | lines between root, forks and tips |
@@ -38,6 +38,7 @@
 
 mod adjacency;
 mod anatomy;
+mod bridges;
 mod components;
 mod curve;
 mod error;
@@ -104,16 +105,13 @@ pub fn build(
 
     // Topology: one component, no loops, no spurs, a root.
     let voxel_graph = graph::of_voxels(&adjacency::Adjacency::of(skeleton), spheres);
-    let (mut graph, _) = components::select(voxel_graph, params, &mut ledger)?;
+    let mut graph = components::select(voxel_graph, params, &mut ledger)?;
     loops::open(&mut graph, params, &mut ledger)?;
     let mut living = living::Living::new(&graph);
     let protection = root::protected_tips(&mut living, params);
     prune::prune(&mut living, &protection, params, &mut ledger);
     let choice = root::choose(&living, params);
-    if let Some(runner_up) = choice.runner_up {
-        let names = ["root_runner_up_x_mm", "root_runner_up_y_mm", "root_runner_up_z_mm"];
-        summary::point(&mut report, names, graph.hubs[runner_up].sample.position_mm);
-    }
+    root::describe(&choice, &living, params, (&mut ledger, &mut report));
 
     // Geometry: forks and tips where they belong, the staircase smoothed away.
     let mut outline = outline::trace(&living, choice.root);
@@ -124,6 +122,10 @@ pub fn build(
     smooth::space_evenly(&mut outline, mask.grid());
     smooth::smooth(&mut outline, mask.grid(), params.smooth_voxels);
     forks::clear_spheres(&mut outline);
+    // Where a line turns back at the border, moved forks and the smoothing kernel may lead it out.
+    for sample in outline.lines.iter_mut().flat_map(|line| &mut line.samples) {
+        sample.position_mm = mask_walk::in_scan(mask.grid(), sample.position_mm);
+    }
 
     let resolution_mm = RESOLUTION * mask.grid().spacing_mm().min_element();
     let nodes = merge::merge_near(&outline_nodes(&outline, resolution_mm, &mut ledger), &mut ledger);

@@ -1,6 +1,6 @@
 //! Whether a point lies in the mask, and how far a ray stays in it.
 
-use espalier_model::Mask;
+use espalier_model::{Grid, Mask};
 use glam::DVec3;
 
 /// Steps of a ray, in smallest spacings.
@@ -10,6 +10,14 @@ const RAY_STEP: f64 = 0.125;
 pub(crate) fn is_inside(mask: &Mask, point_mm: DVec3) -> bool {
     let point_voxel = mask.grid().voxel_from_world().transform_point3(point_mm);
     mask.grid().voxel_at(point_voxel).is_some_and(|voxel| mask.contains(voxel.map(|v| v as i64)))
+}
+
+/// A point, or if it lies outside of the scan, the nearest along its axes inside.
+pub(crate) fn in_scan(grid: &Grid, point_mm: DVec3) -> DVec3 {
+    let voxel = grid.voxel_from_world().transform_point3(point_mm);
+    let last = DVec3::from_array(grid.shape().map(|n| n as f64 - 0.5));
+    let clamped = voxel.clamp(DVec3::splat(-0.5), last);
+    if clamped == voxel { point_mm } else { grid.world_from_voxel().transform_point3(clamped) }
 }
 
 /// How far a ray from `origin_mm` stays in the mask, at most `limit_mm`; `None` if it starts outside.

@@ -3,13 +3,20 @@
 use espalier_model::diagnose::ParamError;
 use serde::{Deserialize, Serialize};
 
-/// What to do with a skeleton in several pieces.
+/// What to do with a skeleton in several pieces. Short gaps are mostly stretches that the segmentation lost, and a
+/// reader expects the vessel to go on; distant pieces are other vessels or noise, and an edge to them would be a vessel
+/// that is not there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Components {
-    /// Keep the longest, drop the others; each drop is in the ledger.
+    /// Keep the longest, join to it what lies within `bridge_mm`, drop the others; each bridge and each drop is in the
+    /// ledger.
     #[default]
+    Join,
+    /// Keep the longest, drop the others; each drop is in the ledger.
     Largest,
+    /// Join all to the longest, over gaps of any width: a forest in one picture, each bridge in the ledger.
+    All,
     /// Refuse the skeleton.
     Refuse,
 }
@@ -32,7 +39,7 @@ pub enum Root {
     /// At the tip of the largest calibre.
     #[default]
     ThickestTip,
-    /// At the most superior tip: the trachea of an airway.
+    /// At the superior end of the trachea: of the tips with at least half the largest calibre the most superior one.
     Superior,
 }
 
@@ -93,8 +100,12 @@ pub enum MissingRadii {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
-    /// What to do with a skeleton in several pieces. Default `largest`: islands are the common fault of masks.
+    /// What to do with a skeleton in several pieces. Default `join`. It matters only if `volume.components` left several.
     pub components: Components,
+    /// With `components = "join"`: the widest gap that is bridged, from surface to surface, in mm; 0 to 1000. Default 3,
+    /// about the width of the lung's subsegmental vessels; a gap wider than the island is long is never bridged. Larger
+    /// joins more, and more that does not belong together.
+    pub bridge_mm: f64,
     /// What to do with loops. Default `cut`: real masks are never trees.
     pub loops: Loops,
     /// Where the tree is rooted. Default `thickest-tip`; `superior` for airways.
@@ -152,6 +163,7 @@ impl Default for Params {
     fn default() -> Self {
         Self {
             components: Components::default(),
+            bridge_mm: 3.0,
             loops: Loops::default(),
             root: Root::default(),
             root_mm: None,
@@ -186,6 +198,7 @@ impl Params {
                 format!("must be between {low} and {high}, is {value}"),
             )
         };
+        in_range("bridge_mm", self.bridge_mm, 0.0, 1000.0)?;
         in_range("prune_factor", self.prune_factor, 0.0, 10.0)?;
         in_range("prune_min_mm", self.prune_min_mm, 0.0, 1e6)?;
         in_range("smooth_voxels", self.smooth_voxels, 0.0, 4.0)?;

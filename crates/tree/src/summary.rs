@@ -17,6 +17,7 @@ pub(crate) fn describe(tree: &Tree, ledger: &Ledger, report: &mut Report) {
     report.count("nodes_per_mm", if length_mm > 0.0 { tree.n_nodes() as f64 / length_mm } else { 0.0 });
     for (name, kind) in [
         ("components_dropped", LedgerKind::ComponentDropped),
+        ("gaps_bridged", LedgerKind::GapBridged),
         ("loops_cut", LedgerKind::LoopCut),
         ("spurs_pruned", LedgerKind::SpurPruned),
         ("tips_extended", LedgerKind::TipExtended),

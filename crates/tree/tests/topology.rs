@@ -103,13 +103,87 @@ fn roots_by_policy() {
     assert!(tree.position_mm(0).distance(at(10.0, 50.0, 4.0)) < 3.0, "{}", tree.position_mm(0));
 
     let mut leaning = run([5, 5, 1], [30, 30, 4], 2.0);
-    leaning.extend(run([30, 30, 4], [50, 30, 7], 1.0));
+    leaning.extend(run([30, 30, 4], [50, 30, 7], 2.0));
     leaning.extend(run([30, 30, 4], [30, 55, 4], 3.0));
     let superior = Params { root: Root::Superior, ..Params::default() };
     let tree = tree_of(&leaning, SHAPE, &superior).expect("a tree").tree;
     assert!(tree.position_mm(0).distance(at(50.0, 30.0, 7.0)) < 3.0, "{}", tree.position_mm(0));
-    let tree = tree_of(&leaning, SHAPE, &Params::default()).expect("a tree").tree;
+    let built = tree_of(&leaning, SHAPE, &Params::default()).expect("a tree");
+    assert!(built.tree.position_mm(0).distance(at(30.0, 55.0, 4.0)) < 5.0, "{}", built.tree.position_mm(0));
+    let chosen = built.ledger.0.iter().find(|e| e.kind == LedgerKind::RootChosen).expect("an entry");
+    assert!((chosen.length_mm - 1.0).abs() < 1e-9, "the lead in calibre: {chosen:?}");
+    assert!(chosen.reason.contains("calibre: 3.000 mm; runner-up 2.000 mm at"), "{}", chosen.reason);
+    assert_eq!(built.report.get("root_lead_mm"), Some(1.0));
+
+    // A thin apical branch that reaches higher than the trachea is not its end.
+    let mut apical = run([5, 5, 1], [30, 30, 4], 3.0);
+    apical.extend(run([30, 30, 4], [50, 30, 8], 1.0));
+    apical.extend(run([30, 30, 4], [30, 55, 4], 2.0));
+    let tree = tree_of(&apical, SHAPE, &superior).expect("a tree").tree;
     assert!(tree.position_mm(0).distance(at(30.0, 55.0, 4.0)) < 5.0, "{}", tree.position_mm(0));
+}
+
+#[test]
+fn a_close_choice_of_root_is_told() {
+    let warnings = |foot_radius| {
+        let mut places = run([30, 5, 4], [30, 30, 4], foot_radius);
+        places.extend(run([30, 30, 4], [10, 50, 4], 2.0));
+        places.extend(run([30, 30, 4], [50, 50, 4], 1.5));
+        tree_of(&places, SHAPE, &Params::default()).expect("a tree").report.warnings
+    };
+    assert_eq!(warnings(2.1)[0].code, "W-TREE-ROOT-CLOSE");
+    assert_eq!(warnings(2.5), []);
+}
+
+#[test]
+fn short_gaps_are_bridged() {
+    // A vessel lost over three voxels; then one that begins beside the middle of another.
+    let mut lost = run([5, 30, 4], [25, 30, 4], 2.0);
+    lost.extend(run([29, 30, 4], [45, 30, 4], 1.0));
+    let built = tree_of(&lost, SHAPE, &Params::default()).expect("a tree");
+    let bridge = built.ledger.0.iter().find(|e| e.kind == LedgerKind::GapBridged).expect("a bridge");
+    assert!(bridge.position_mm.distance(at(27.0, 30.0, 4.0)) < 1e-9 && bridge.length_mm == 4.0, "{bridge:?}");
+    assert!(bridge.reason.contains("16.000 mm joined over a gap of 1.000 mm"), "{}", bridge.reason);
+    assert_eq!((built.tree.n_tips(), built.tree.branches().list().len()), (1, 1));
+    assert_eq!(built.ledger.n_of(LedgerKind::ComponentDropped), 0);
+
+    let mut beside = run([5, 30, 4], [55, 30, 4], 2.0);
+    beside.extend(run([30, 34, 4], [30, 55, 4], 1.0));
+    beside.extend(run([15, 34, 4], [15, 55, 4], 1.0));
+    let built = tree_of(&beside, SHAPE, &Params::default()).expect("a tree");
+    assert_eq!(built.report.get("gaps_bridged"), Some(2.0));
+    assert_eq!((built.tree.n_tips(), built.tree.branches().list().len()), (3, 5));
+
+    let none = Params { bridge_mm: 0.5, ..Params::default() };
+    assert_eq!(tree_of(&beside, SHAPE, &none).expect("a tree").tree.n_tips(), 1);
+    let largest = Params { components: Components::Largest, ..Params::default() };
+    assert_eq!(tree_of(&beside, SHAPE, &largest).expect("a tree").tree.n_tips(), 1);
+}
+
+#[test]
+fn what_is_no_vessel_is_not_bridged_to() {
+    // A blob as long as it is wide, beside the tree, and a twig farther away than it is long.
+    let mut places = run([5, 30, 4], [55, 30, 4], 2.0);
+    places.extend(run([20, 37, 4], [22, 37, 4], 3.0));
+    places.extend(run([40, 36, 4], [40, 38, 4], 0.5));
+    let wide = Params { bridge_mm: 10.0, ..Params::default() };
+    let built = tree_of(&places, SHAPE, &wide).expect("a tree");
+    assert_eq!(built.ledger.n_of(LedgerKind::GapBridged), 0);
+    assert_eq!(built.ledger.n_of(LedgerKind::ComponentDropped), 2);
+}
+
+#[test]
+fn a_forest_becomes_one_tree_if_asked() {
+    let mut forest = run([5, 5, 4], [55, 5, 4], 2.0);
+    forest.extend(run([5, 30, 4], [45, 30, 4], 1.5));
+    forest.extend(run([30, 50, 4], [50, 50, 4], 1.0));
+    let all = Params { components: Components::All, ..Params::default() };
+    let built = tree_of(&forest, SHAPE, &all).expect("a tree");
+    assert_eq!(built.ledger.n_of(LedgerKind::GapBridged), 2);
+    assert_eq!(built.ledger.n_of(LedgerKind::ComponentDropped), 0);
+    assert!(built.tree.length_mm() > 50.0 + 40.0 + 20.0 + 40.0);
+    let kept = tree_of(&forest, SHAPE, &Params::default()).expect("a tree");
+    assert_eq!(kept.ledger.n_of(LedgerKind::ComponentDropped), 2);
 }
 
 #[test]

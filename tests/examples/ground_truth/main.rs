@@ -1,0 +1,38 @@
+//! Whole phantom trees against their truth: `cargo run --release -p espalier-tests --example ground_truth`
+//!
+//! For each grid, an airway and a vessel tree of the phantom generator, from three masks: the voxels whose centre lies
+//! in the body (`clean`), the same with 15 % of its surface's voxels flipped (`rough`), and what region growing makes of
+//! its noisy CT (`ct`). Columns and tolerances are those of `espalier_tests::ground_truth`. `all` counts every tip of the
+//! truth; what a grid cannot show is part of the figure.
+//! `--small` takes one grid and small trees; `--only WORD` the rows that hold the word.
+#![allow(clippy::print_stdout, clippy::print_stderr, clippy::disallowed_methods, reason = "a program")]
+
+use std::process::ExitCode;
+
+use espalier_tests::ground_truth::phantoms::{self, Case, GRIDS_MM, Scan};
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let only = arguments.iter().position(|word| word == "--only").and_then(|at| arguments.get(at + 1));
+    let grids: &[[f64; 3]] =
+        if arguments.iter().any(|word| word == "--small") { &GRIDS_MM[2..3] } else { &GRIDS_MM };
+    println!("{}", phantoms::HEADING);
+    for &spacing_mm in grids {
+        for kind in phantoms::KINDS {
+            for scan in Scan::ALL {
+                let case = Case { kind, spacing_mm, scan, seed: 7 };
+                if only.is_some_and(|word| !case.to_string().contains(word.as_str())) {
+                    continue;
+                }
+                match phantoms::measure(&case) {
+                    Ok(measured) => println!("{measured}"),
+                    Err(error) => {
+                        eprintln!("error: {case}: {error}");
+                        return ExitCode::FAILURE;
+                    }
+                }
+            }
+        }
+    }
+    ExitCode::SUCCESS
+}
