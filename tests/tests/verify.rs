@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use espalier_model::Diagnose;
 use espalier_model::diagnose::Class;
-use espalier_pipeline::{Error, Outcome, Override, verify};
+use espalier_pipeline::{Check, Error, Outcome, Override, verify};
 use espalier_tests::{run, set, small_swarm};
 use tempfile::TempDir;
 
@@ -109,6 +109,21 @@ fn runs_hold_whatever_their_settings() {
         assert!(verification.verdict().is_ok() && verification.checks.len() > 40);
         let json = verification.to_json();
         assert!(json.contains("\"format\": \"espalier-verification\"") && json.contains("\"holds\": true"));
+    }
+}
+
+#[test]
+fn a_run_from_a_mask_holds() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/y.nii.gz");
+    run(&fixture, folder.path(), &small_swarm(), 2).expect("a run");
+    let verification = verify(folder.path(), Some(2)).expect("a readable folder");
+    let failed: Vec<_> = verification.checks.iter().filter(|(_, check)| check.fails()).collect();
+    assert!(failed.is_empty(), "{failed:?}");
+    // Tables of the tree stage are held against the dictionary, spheres too, whose first line names their format.
+    for table in ["branches.tsv", "profiles.tsv", "stages/03-radius/spheres.tsv"] {
+        let is_checked = |(file, check): &(String, Check)| file == table && check.name == "columns";
+        assert!(verification.checks.iter().any(is_checked), "{table}");
     }
 }
 

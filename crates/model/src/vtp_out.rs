@@ -4,7 +4,7 @@
 //! **Format** `espalier-vtp` version 1. One point for each node, in the order of `nodes.tsv`; one polyline for each
 //! branch, from the fork or root that it starts from. Point arrays `radius_mm`, `MaximumInscribedSphereRadius` (the same
 //! by the name that VMTK reads), `node`, `branch`, `generation`, `strahler`, `from_root_mm`, where whole numbers that do
-//! not exist are −1; the cell arrays are the columns of `branches.tsv` that are numbers, `NaN` where there is none.
+//! not exist are −1; the cell arrays, if the tree was measured, are the columns of `branches.tsv` that are numbers, `NaN` where there is none.
 //! **Spaces** LPS+ mm, as 3D Slicer and ITK hold meshes in files, stated in the field data `SPACE`, where Slicer looks
 //! for it, and in a comment. x and y are those of our tables with the other sign.
 //! **Guarantees** little-endian binary, without compression or time: the same tree gives the same bytes.
@@ -25,14 +25,16 @@ pub fn write(tree: &Tree, anatomy: &Anatomy) -> String {
     text += "<!-- espalier-vtp 1; SPACE=LPS; mm -->\n";
     text += "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<PolyData>\n";
     text += "<FieldData>\n<Array type=\"String\" Name=\"SPACE\" NumberOfTuples=\"1\" format=\"ascii\">76 80 83 0</Array>\n</FieldData>\n";
-    let (n_points, n_lines) = (tree.n_nodes(), anatomy.branches.len());
+    let (n_points, n_lines) = (tree.n_nodes(), tree.branches().list().len());
     // Writing to a string cannot fail.
     let _ = writeln!(
         text,
         "<Piece NumberOfPoints=\"{n_points}\" NumberOfVerts=\"0\" NumberOfLines=\"{n_lines}\" NumberOfStrips=\"0\" NumberOfPolys=\"0\">"
     );
     text += &point_data(tree);
-    text += &cell_data(anatomy);
+    if anatomy.branches.len() == n_lines {
+        text += &cell_data(anatomy);
+    }
     text += &points(tree);
     text += &lines(tree);
     text += "</Piece>\n</PolyData>\n</VTKFile>\n";
@@ -134,6 +136,26 @@ mod tests {
 
     use super::*;
     use crate::Node;
+
+    #[test]
+    fn our_reader_reads_it_back() {
+        let node = |x: f64, parent| Node {
+            position_mm: DVec3::new(x, -0.1, 1.0 / 3.0),
+            radius_mm: 0.25 + x,
+            parent,
+            kind: 0,
+        };
+        let tree = Tree::new(&[node(0.0, None), node(1.5, Some(0)), node(7.0, Some(1)), node(9.0, Some(1))])
+            .expect("a tree");
+        let text = write(&tree, &Anatomy::default());
+        let scale = crate::swc::SwcScale::millimetres();
+        // It names its space: none has to be assumed.
+        let (read, _) = crate::polydata::parse(text.as_bytes(), &scale, None).expect("polylines");
+        for (node, data) in tree.nodes().iter().enumerate() {
+            assert_eq!((read.points_mm[node], read.radii_mm[node]), (data.position_mm, data.radius_mm));
+        }
+        assert_eq!(read.lines.len(), tree.branches().list().len());
+    }
 
     #[test]
     fn what_is_written_can_be_read() {

@@ -80,7 +80,9 @@ fn last_digit(text: &str) -> f64 {
 /// `dictionary` is the text of `dictionary.tsv`; `names` are those under which it may list the table.
 #[must_use]
 pub fn check_header(dictionary: &str, names: &[&str], table: &str) -> Check {
-    let header: Vec<&str> = table.lines().next().unwrap_or_default().split('\t').collect();
+    // A table that is read again begins with a line that names its format.
+    let first = table.lines().find(|line| !line.starts_with('#')).unwrap_or_default();
+    let header: Vec<&str> = first.split('\t').collect();
     let listed: Vec<&str> = dictionary
         .lines()
         .skip(1)
