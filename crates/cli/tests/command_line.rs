@@ -71,7 +71,7 @@ fn help_teaches_and_succeeds() {
     assert_eq!(output.status.code(), Some(0));
     for command in [
         "run", "compare", "sweep", "phantom", "volume", "skeleton", "radius", "tree", "views", "embed",
-        "render", "verify",
+        "render", "verify", "profile",
     ] {
         assert!(text.contains(&format!("\n  {command} ")), "no {command} in: {text}");
     }
@@ -90,7 +90,8 @@ fn missing_file() {
 fn directory_as_input() {
     let folder = tempfile::tempdir().expect("temporary folder");
     fs::create_dir(folder.path().join("scan.nii.gz")).expect("folder");
-    refused(&folder, &["run", "scan.nii.gz"], 74, &["scan.nii.gz", "directory"]);
+    // A folder is a DICOM series; this one holds none.
+    refused(&folder, &["run", "scan.nii.gz"], 3, &["scan.nii.gz", "no DICOM image"]);
 }
 
 #[test]
@@ -351,7 +352,7 @@ fn manual_edits() {
     };
     let back_deg = (at(4) - at(1)).angle_to(at(0) - at(1)).to_degrees();
     let turn = format!("{},\n{}", edit(1, 2, 3.0), edit(2, 1, back_deg));
-    refuse(&turn, 8, &["E-EMBED-EDITS", "edits[1]"]);
+    refuse(&turn, 3, &["E-EMBED-EDIT-FOLD", "edits[1]"]);
     refused(
         &folder,
         &[from_embed.as_slice(), &["--set", "embed.edits=nowhere.json"]].concat(),
@@ -362,6 +363,27 @@ fn manual_edits() {
     assert_eq!(run(&["run", "fork.toml", "-o", "out", "--from", "embed"]), plain);
     run(&["embed", "again", "--set", "embed.edits="]);
     assert_eq!(run(&["render", "again"]), plain);
+}
+
+#[test]
+fn the_way_to_a_tip() {
+    let folder = folder_with("tree.swc", SMALL_TREE.as_bytes());
+    let output = espalier(folder.path(), &["run", "tree.swc", "-o", "out", "--to", "tree", "-q"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let way = |place: &[&str]| {
+        let output = espalier(folder.path(), &[["profile", "out"].as_slice(), place].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let table = way(&["--tip", "3"]);
+    assert!(table.starts_with("branch\tnode\tfrom_start_mm\t"), "{table}");
+    assert_eq!(table.lines().count(), 5, "{table}");
+    assert_eq!(way(&["--branch", "1"]), table);
+    assert_eq!(way(&["--to=0.02,0.05,0.01"]), table);
+    assert_eq!(way(&["--to", "-0.02,0.05,0.01"]), way(&["--node", "5"]));
+    refused(&folder, &["profile", "out", "--branch", "3"], 2, &["no branch 3", "branches.tsv"]);
+    refused(&folder, &["profile", "out"], 2, &["--node"]);
+    refused(&folder, &["profile", "nowhere", "--node", "1"], 74, &["nowhere"]);
 }
 
 /// A fork with a bend in each arm, as SWC in µm.
