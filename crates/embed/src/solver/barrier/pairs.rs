@@ -20,8 +20,9 @@ use super::super::work::Work;
 use super::contact::Contact;
 use crate::problem::Problem;
 
-/// The skin as a share of the reach: a wider one lists more pairs, a narrower one is left sooner. Not tuned.
-const SKIN_SHARE: f64 = 0.35;
+/// The skin as a share of the reach. A wider one lists more pairs and is left as soon where whole subtrees turn: on an
+/// airway of 4099 nodes the first relaxing takes 575 million units of work at .35, 445 at .15, 389 at .05.
+const SKIN_SHARE: f64 = 0.05;
 /// More pairs than this for each edge are not listed: the reach is halved instead, so that memory is bounded.
 const MOST_PAIRS_PER_EDGE: usize = 60;
 /// Edges whose neighbours are looked up together.
