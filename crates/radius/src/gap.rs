@@ -19,7 +19,9 @@ pub(crate) fn gap_mm(point: DVec3, tangent: DVec3, distance_mm: f64, spacing: DV
     // Along the axis that the slab cuts most squarely, only a few voxels of a line lie in it.
     let along = largest_axis(tangent / spacing);
     let [first, second] = [(along + 1) % 3, (along + 2) % 3];
-    let mut inner_squared = 0.0_f64;
+    // The gap is at most the largest spacing, so what lies deeper need not be looked at.
+    let least = (distance_mm - spacing.max_element()).max(0.0);
+    let mut inner_squared = least * least;
     for a in low[first]..=high[first] {
         for b in low[second]..=high[second] {
             let mut voxel = DVec3::ZERO;

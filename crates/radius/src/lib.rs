@@ -87,8 +87,8 @@ fn measure(
     let OnAxis { center, radius_mm, section } = match params.rule {
         Rule::Voxel => {
             let center = background.position_mm(voxel);
-            let section =
-                tangent.and_then(|tangent| section::through(background, center, tangent, distance_mm));
+            let section = tangent
+                .and_then(|tangent| section::through(background, (voxel, center), tangent, distance_mm));
             OnAxis { center, radius_mm: distance_mm, section }
         }
         Rule::NeighborhoodMax => OnAxis {

@@ -40,12 +40,6 @@ impl<'m> Background<'m> {
         (point / self.spacing + 0.5).floor().to_array().map(|c| c as i64)
     }
 
-    /// Whether a point, in voxels, lies between the outer faces of the scan.
-    pub(crate) fn is_in_scan(&self, point_voxel: DVec3) -> bool {
-        let [nx, ny, nz] = self.bits.shape().map(|n| n as f64 - 0.5);
-        point_voxel.cmpge(DVec3::splat(-0.5)).all() && point_voxel.cmplt(DVec3::new(nx, ny, nz)).all()
-    }
-
     /// Whether a voxel is foreground.
     pub(crate) fn is_foreground(&self, voxel: [i64; 3]) -> bool {
         self.bits.contains(voxel)
@@ -72,6 +66,14 @@ impl<'m> Background<'m> {
     pub(crate) fn border_mm(&self, point: DVec3) -> f64 {
         let from_low = point + 0.5 * self.spacing;
         from_low.min(self.last_mm() + 0.5 * self.spacing - point).min_element()
+    }
+
+    /// How far one can go from a point both ways along a direction before leaving the scan, in mm; 0 if it is outside.
+    pub(crate) fn free_mm(&self, point: DVec3, direction: DVec3) -> f64 {
+        let from_low = point + 0.5 * self.spacing;
+        let nearest = from_low.min(self.last_mm() + 0.5 * self.spacing - point);
+        let free = |axis: usize| nearest[axis] / direction[axis].abs().max(f64::MIN_POSITIVE);
+        free(0).min(free(1)).min(free(2)).max(0.0)
     }
 
     /// The distance from a voxel's centre to the nearest background centre, in mm; 0 for background and outside the

@@ -1,35 +1,31 @@
 //! The mask's cross-section: its area and its centroid.
 //!
-//! **Input** a mask, a point inside, the direction of the branch, the distance r to the background there, at least
-//! [`MIN_SPACINGS`] of the largest spacing. **Output** the radius of the circle with the section's area, in mm, and the
-//! section's centroid, in grid mm.
-//! **Steps** 1. Lay a square grid over the plane across the branch, 8 to 24 steps to the radius,
-//! and two more like it a voxel before and behind, where those lie in the scan.
-//! 2. Flood from the point over the places that are
-//! in the mask on most of the planes, in steps along the grid. 3. Area = places · step², the mean of the planes.
-//! **Guarantees** none where the flood reaches [`LIMIT_RADII`] · r from the point along an axis of the grid: there
-//! the plane runs along another branch, or the mask is no tube.
-//! **Cost** O((LIMIT_RADII · samples)²).
+//! **Input** a mask, a foreground voxel and a point near it, the direction of the branch, the distance r to the background
+//! there, at least [`MIN_SPACINGS`] of the largest spacing. **Output** the radius of the circle with the section's area, in
+//! mm, and the section's centroid, in grid mm.
+//! **Steps** 1. The slab of three voxels about the point across the direction; where the scan ends nearer, a thinner one.
+//! 2. Flood it from the voxel over faces. A voxel counts by its share in the slab, as if it reached along the direction as
+//! far as its box does: so sums do not depend on how the grid lies. 3. Area = volume / thickness.
+//! **Guarantees** none where the flood reaches [`LIMIT_RADII`] · r from the point: there the slab runs along another
+//! branch, or the mask is no tube.
+//! **Why not one plane?** In tubes of one to two voxels its centroid jumps from voxel to voxel: the centreline came out
+//! 0.18 voxel off the axis, with three voxels 0.15.
+//! **Cost** O(voxels of the slab).
 
 use std::f64::consts::PI;
 
-use espalier_geom::space::plane_axes;
 use glam::DVec3;
 
 use crate::nearest::Background;
 
-/// Grid steps in a radius: at least 8; at most 24, which bounds the work; between, two to a voxel, since coarser ones beat
-/// against the voxels (a trachea along the grid came out 2 % too thin with 8).
-const SAMPLES: [f64; 2] = [8.0, 24.0];
-const SAMPLES_PER_VOXEL: f64 = 2.0;
+/// Half the thickness of the slab, in voxels along the direction.
+const HALF_SLAB: f64 = 1.5;
 /// How far a section may reach, in inscribed radii.
-const LIMIT_RADII: i64 = 3;
-
-/// The least radius taken for the extent of the grid: a section of one or two voxels is as wide as its voxels.
+const LIMIT_RADII: f64 = 3.0;
+/// The least radius taken for that: a section of one or two voxels is as wide as its voxels.
 const MIN_SPACINGS: f64 = 0.75;
-
-/// The planes to both sides of the section, in voxels along the branch.
-const PLANE_STEP: f64 = 1.0;
+/// Bits in a word.
+const WORD: usize = u64::BITS as usize;
 
 /// A cross-section.
 #[derive(Clone, Copy, Debug)]
@@ -40,65 +36,73 @@ pub(crate) struct Section {
     pub(crate) centroid: DVec3,
 }
 
-/// The section through `point` (grid mm) across `tangent`.
+/// The section through `point` (grid mm) across `tangent`, which the foreground voxel `start` is part of.
 pub(crate) fn through(
     background: Background<'_>,
-    point: DVec3,
+    (start, point): ([i64; 3], DVec3),
     tangent: DVec3,
     radius_mm: f64,
 ) -> Option<Section> {
     let spacing = background.spacing_mm();
-    let extent_mm = radius_mm.max(MIN_SPACINGS * spacing.max_element());
-    let n_samples =
-        (SAMPLES_PER_VOXEL * extent_mm / spacing.min_element()).ceil().clamp(SAMPLES[0], SAMPLES[1]);
-    let step_mm = extent_mm / n_samples;
-    let limit = LIMIT_RADII * n_samples as i64;
-    let width = 2 * limit + 1;
-    let (right, up) = plane_axes(tangent, DVec3::Z);
+    let limit_mm = LIMIT_RADII * radius_mm.max(MIN_SPACINGS * spacing.max_element());
+    // How far a voxel reaches along the direction.
+    let depth_mm = (tangent.abs() * spacing).element_sum();
+    let thickness_mm = HALF_SLAB * (tangent.abs() * spacing).max_element();
+    let half_mm = thickness_mm.min(background.free_mm(point, tangent)).max(0.5 * depth_mm);
 
-    // In voxels, with the half that rounding down needs.
-    let along_voxel = tangent * (PLANE_STEP * (tangent.abs() * spacing).max_element()) / spacing;
-    let (right_voxel, up_voxel) = (right * step_mm / spacing, up * step_mm / spacing);
-    let planes: Vec<DVec3> = [-1.0, 0.0, 1.0]
-        .into_iter()
-        .map(|step| point / spacing + along_voxel * step)
-        .filter(|&origin| background.is_in_scan(origin))
-        .map(|origin| origin + 0.5)
-        .collect();
-    let n_planes = planes.len() as i64;
-    let n_inside_at = |u: i64, v: i64| {
-        let aside = right_voxel * u as f64 + up_voxel * v as f64;
-        let is_inside =
-            |plane: &&DVec3| background.is_foreground((**plane + aside).floor().to_array().map(|c| c as i64));
-        planes.iter().filter(is_inside).count() as i64
-    };
-
-    let mut is_seen = vec![false; (width * width) as usize];
-    let mut stack = vec![(0, 0)];
-    is_seen[(limit * width + limit) as usize] = true;
-    let (mut n_inside, mut sum_u, mut sum_v) = (0_i64, 0_i64, 0_i64);
-    while let Some((u, v)) = stack.pop() {
-        let n = n_inside_at(u, v);
-        (n_inside, sum_u, sum_v) = (n_inside + n, sum_u + n * u, sum_v + n * v);
-        if 2 * n <= n_planes {
+    let mut seen = Seen::about((DVec3::splat(limit_mm) + half_mm) / spacing);
+    let mut stack = vec![(start, seen.center)];
+    seen.insert(seen.center);
+    let (mut total, mut sum) = (0.0, DVec3::ZERO);
+    while let Some((voxel, place)) = stack.pop() {
+        let from_point = background.position_mm(voxel) - point;
+        let along_mm = tangent.dot(from_point);
+        let share = ((half_mm - along_mm.abs()) / depth_mm + 0.5).clamp(0.0, 1.0);
+        let across = from_point - tangent * along_mm;
+        total += share;
+        sum += across * share;
+        // What lies in the slab for its smaller part is counted, but leads no further.
+        if share < 0.5 {
             continue;
         }
-        if u.abs() == limit || v.abs() == limit {
+        if across.length_squared() > limit_mm * limit_mm {
             return None;
         }
-        for (u, v) in [(u - 1, v), (u + 1, v), (u, v - 1), (u, v + 1)] {
-            let seen = &mut is_seen[((v + limit) * width + u + limit) as usize];
-            if !*seen {
-                *seen = true;
-                stack.push((u, v));
+        for (axis, stride) in seen.strides.into_iter().enumerate() {
+            for (step, place) in [(-1, place - stride), (1, place + stride)] {
+                let mut next = voxel;
+                next[axis] += step;
+                // Most were met before, and that is the cheaper question.
+                if seen.insert(place) && background.is_foreground(next) {
+                    stack.push((next, place));
+                }
             }
         }
     }
-    (n_inside > 0).then(|| {
-        let n = n_inside as f64;
-        Section {
-            area_radius_mm: (n / (n_planes as f64 * PI)).sqrt() * step_mm,
-            centroid: point + (right * sum_u as f64 + up * sum_v as f64) * (step_mm / n),
-        }
-    })
+    let area_mm2 = total * spacing.element_product() / (2.0 * half_mm);
+    (total > 0.0).then(|| Section { area_radius_mm: (area_mm2 / PI).sqrt(), centroid: point + sum / total })
+}
+
+/// The voxels of a box that were met, by their place in it.
+struct Seen {
+    center: usize,
+    strides: [usize; 3],
+    words: Vec<u64>,
+}
+
+impl Seen {
+    /// A box that reaches from its centre by `reach` voxels, and farther than a step beyond.
+    fn about(reach: DVec3) -> Self {
+        let [nx, ny, nz] = (reach + 3.0).to_array().map(|r| 2 * r as usize + 1);
+        let strides = [1, nx, nx * ny];
+        Self { center: (nx * ny * nz) / 2, strides, words: vec![0; (nx * ny * nz).div_ceil(WORD)] }
+    }
+
+    /// Whether a place is met for the first time.
+    fn insert(&mut self, place: usize) -> bool {
+        let (word, bit) = (&mut self.words[place / WORD], 1 << (place % WORD));
+        let is_new = *word & bit == 0;
+        *word |= bit;
+        is_new
+    }
 }

@@ -3,6 +3,9 @@
 use espalier_model::{Ledger, LedgerKind, Report, Tree};
 use glam::DVec3;
 
+/// A larger share of the centreline in dropped components deserves a warning.
+const MAX_DROPPED: f64 = 0.05;
+
 /// Counts that every tree has, and those of its ledger.
 pub(crate) fn describe(tree: &Tree, ledger: &Ledger, report: &mut Report) {
     let branches = tree.branches();
@@ -28,6 +31,24 @@ pub(crate) fn describe(tree: &Tree, ledger: &Ledger, report: &mut Report) {
         report.count_usize(name, ledger.n_of(kind));
     }
     point(report, ["root_x_mm", "root_y_mm", "root_z_mm"], tree.position_mm(0));
+
+    // Islands of noise are short; a lung or a lobe that is missing from the picture is not.
+    let dropped_mm: f64 = ledger
+        .0
+        .iter()
+        .filter(|entry| entry.kind == LedgerKind::ComponentDropped)
+        .map(|entry| entry.length_mm)
+        .sum();
+    let share = dropped_mm / (dropped_mm + length_mm).max(f64::MIN_POSITIVE);
+    if share > MAX_DROPPED {
+        report.warn(
+            "W-TREE-DROPPED",
+            format!(
+                "{:.0} % of the centreline lie in components that are not part of the tree: set tree.components = \"all\" for one tree of a forest, or make a run of each",
+                100.0 * share
+            ),
+        );
+    }
 
     let n_without_radius = tree.nodes().iter().filter(|node| node.radius_mm <= 0.0).count();
     if n_without_radius > 0 {

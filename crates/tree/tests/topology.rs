@@ -184,6 +184,8 @@ fn a_forest_becomes_one_tree_if_asked() {
     assert!(built.tree.length_mm() > 50.0 + 40.0 + 20.0 + 40.0);
     let kept = tree_of(&forest, SHAPE, &Params::default()).expect("a tree");
     assert_eq!(kept.ledger.n_of(LedgerKind::ComponentDropped), 2);
+    assert!(kept.report.warnings.iter().any(|warning| warning.code == "W-TREE-DROPPED"));
+    assert!(built.report.warnings.iter().all(|warning| warning.code != "W-TREE-DROPPED"));
 }
 
 #[test]
