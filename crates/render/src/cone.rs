@@ -18,6 +18,9 @@ use glam::{DVec3, Vec2, Vec3};
 
 /// Below this tilt a cone counts as flat.
 const FLAT: f32 = 1e-6;
+/// From this radius on, a pixel's nine samples and its middle one differ by less than a level of colour away from the
+/// rim. Organs at their true widths are narrower on a page of the default size.
+const BROAD_PX: f32 = 64.0;
 
 /// A sphere at a node, in pixels.
 #[derive(Clone, Copy, Debug)]
@@ -132,6 +135,11 @@ impl Cone {
         let taper = (from.taper + hit.share * (to.taper - from.taper)).clamp(-0.95, 0.95);
         let across = (exact - axis * exact.dot(axis)).normalize_or(exact);
         (across * (1.0 - taper * taper).sqrt() - axis * taper).normalize_or(exact)
+    }
+
+    /// Whether the surface hardly turns within a pixel, so that one sample says what many do.
+    pub(crate) fn is_broad(&self) -> bool {
+        self.radii[0].min(self.radii[1]) >= BROAD_PX
     }
 
     /// The box that holds the cone: low and high corner.

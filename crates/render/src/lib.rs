@@ -120,7 +120,6 @@ pub fn render(
         Depth::Spatial { axes: [view.up.cross(view.towards_camera), view.up] },
     )?;
 
-    let pixels = artist.draw(&map);
     let title = params.title.as_deref().unwrap_or("planar map of a tree");
     let content = svg::Content {
         tree,
@@ -130,13 +129,21 @@ pub fn render(
         title,
         prefix: "",
     };
-    let layers = || layers::Layers::new(tree, artist.branches, embedding, (&map.page, &pixels)).encode();
+    // Each PNG is packed by one thread, so the pictures are made side by side.
+    let draw_map = || {
+        let pixels = artist.draw(&map);
+        let layers = || layers::Layers::new(tree, artist.branches, embedding, (&map.page, &pixels)).encode();
+        let (png, exr) = rayon::join(|| artist.png(&map, &pixels), || params.exr.then(layers).transpose());
+        (png, exr, report(tree, [&map, &global], &pixels))
+    };
+    let draw_global = || artist.png(&global, &artist.draw(&global));
+    let ((png, exr, report), global_view_png) = rayon::join(draw_map, draw_global);
     Ok(Rendered {
-        png: artist.png(&map, &pixels)?,
+        png: png?,
         svg: svg::svg(&content, &map.page, &map.groups, &artist.colors),
-        exr: params.exr.then(layers).transpose()?,
-        global_view_png: artist.png(&global, &artist.draw(&global))?,
-        report: report(tree, [&map, &global], &pixels),
+        exr: exr?,
+        global_view_png: global_view_png?,
+        report,
     })
 }
 

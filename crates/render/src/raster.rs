@@ -12,7 +12,8 @@
 //! **Guarantees** the same bytes for any number of threads: a band of tiles is one task, and inside a tile cones
 //! come in preorder.
 //! **Source** section 4.1 of [Hu2022]; the blending is ours.
-//! **Cost** O(S² · sum of the cones' areas + E) time, S = 1 where a tile is crowded; 32 bytes a pixel. [`layers`] tells that sum beforehand.
+//! **Cost** O(S² · sum of the cones' areas + E) time, S = 1 where a tile is crowded or
+//! inside of one broad cone; 32 bytes a pixel. [`layers`] tells that sum beforehand.
 
 use std::ops::RangeInclusive;
 
@@ -138,7 +139,9 @@ pub(crate) fn rasterise(job: &Job<'_>) -> Vec<Pixel> {
                 continue;
             }
             let origin = Vec2::new((tile_x * TILE) as f32, (tile_y * TILE) as f32);
-            let detail = Detail::for_layers(n_layers[tile_y * tiles.n_x + tile_x], is_plain);
+            let n_layers = n_layers[tile_y * tiles.n_x + tile_x];
+            let is_one_body = matches!(list, [only] if job.drawn[*only as usize].cone.is_broad());
+            let detail = Detail::of_tile(n_layers, is_one_body, is_plain);
             samples.draw(job, list, origin, detail);
             let columns = tile_x * TILE..((tile_x + 1) * TILE).min(width);
             for (row, line) in band.chunks_mut(width).enumerate() {

@@ -87,14 +87,15 @@ pub(crate) enum Detail {
 }
 
 impl Detail {
-    /// For a tile that cones cover so many times over, in a picture that blends or not.
-    pub(crate) fn for_layers(n_layers: f64, is_plain: bool) -> Self {
+    /// For a tile that cones cover so many times over or that one broad cone has for itself, in a picture that blends
+    /// or not.
+    pub(crate) fn of_tile(n_layers: f64, is_one_body: bool, is_plain: bool) -> Self {
         if is_plain {
             Self::Plain
-        } else if n_layers <= FINE_LAYERS {
-            Self::Fine
-        } else {
+        } else if is_one_body || n_layers > FINE_LAYERS {
             Self::Coarse
+        } else {
+            Self::Fine
         }
     }
 

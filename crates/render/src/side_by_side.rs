@@ -50,7 +50,7 @@ const MANY_CROSSINGS: usize = 40;
 /// Edges in small panels are at least this share of `min_width_px` wide.
 const PANEL_PEN: f64 = 0.7;
 /// Lines of notes below a panel.
-const N_NOTES: usize = 4;
+const N_NOTES: usize = 5;
 
 /// A tree with the layouts of its methods.
 #[derive(Clone, Debug)]
@@ -336,7 +336,8 @@ impl Artist<'_> {
         let (title, notes) = match panel {
             Some(panel) => {
                 let chosen = if panel.is_chosen { "  (the map)" } else { "" };
-                (format!("{}{chosen}", panel.row.method), notes(section, panel.row))
+                let title = format!("{}{}{chosen}", panel.row.method, other_targets(section, panel.row));
+                (title, notes(section, panel.row))
             }
             None => (
                 "in space, from the global view".to_owned(),
@@ -466,6 +467,13 @@ fn kinship(frame: &Frame<'_>) -> Kinship {
     Kinship::new(frame.tree, &frame.branches, &frame.scene, frame.page.px_per_mm)
 }
 
+/// What tells a method that ran twice apart: the targets of its row, where they are not the embedding's.
+fn other_targets(section: &Section<'_>, row: &MethodRow) -> String {
+    let chosen = section.panels.iter().find(|panel| panel.is_chosen).map(|panel| panel.row.targets);
+    let is_other = chosen.is_some_and(|chosen| chosen != row.targets);
+    if is_other { format!(", targets {}", row.targets.name()) } else { String::new() }
+}
+
 /// What is said below a layout, each with whether it is the best of its section.
 fn notes(section: &Section<'_>, row: &MethodRow) -> Vec<(String, bool)> {
     // A layout may be scored against other targets than the embedding.
@@ -501,10 +509,12 @@ fn notes(section: &Section<'_>, row: &MethodRow) -> Vec<(String, bool)> {
             &|mean| format!("lengths off by {}", heading::percent(mean)),
             format!(", max {}", heading::percent(losses.length_loss_max)),
         ),
+        note(&|row| row.losses.stress, &|stress| format!("stress {stress:.3}"), String::new()),
+        // The largest is the best.
         note(
-            &|row| row.losses.stress,
-            &|stress| format!("stress {stress:.3}"),
-            format!(", clearance {:.3} edges", losses.clearance_min_edges),
+            &|row| -row.losses.clearance_min_edges,
+            &|clearance| format!("clearance {:.3} edges", -clearance),
+            String::new(),
         ),
     ]
 }
