@@ -127,6 +127,7 @@ fn load(file: &Path) -> Outcome<Mask> {
     let params = espalier_volume::Params {
         components: espalier_volume::Components::All,
         fill_cavities: false,
+        close_tunnels: false,
         ..espalier_volume::Params::default()
     };
     Ok(espalier_volume::read_mask(file, &espalier_volume::ReadOptions::default(), &params)?.mask)

@@ -206,6 +206,12 @@ fn scaling_and_padding() {
     assert_eq!([0, 30, 60].map(|i| each.volume.value(i)), [-1000.0, 200.0 - 1000.0, 200.0 + 24.0]);
     assert_eq!(each.report.get("dicom_scalings"), Some(3.0));
 
+    // Scaling that cannot be read is no scaling of 1 and 0.
+    for (element, text) in [(0x0028_1053, b"1,5 "), (0x0028_1052, b"1\\2 "), (0x0028_1053, b"inf ")] {
+        let slices = stack(&[0.0, 1.0]).into_iter().map(|slice| slice.with(element, "DS", text));
+        assert_eq!(code_of(&slices.collect::<Vec<_>>()), "E-DICOM-FIELD");
+    }
+
     let mut padded = stack(&[0.0, 1.0]);
     padded[1].values[3] = -2000;
     let padded: Vec<Slice> =

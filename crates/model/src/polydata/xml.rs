@@ -188,7 +188,9 @@ fn read_lines(
         let line = points
             .get(start..end)
             .ok_or_else(|| PolydataError::Word { what: "the end of a line", found: offset.to_string() })?;
-        let index = |&point: &f64| if point >= 0.0 { point as usize + first_point } else { usize::MAX };
+        let index = |&point: &f64| {
+            if point >= 0.0 { (point as usize).saturating_add(first_point) } else { usize::MAX }
+        };
         cut.push(line.iter().map(index).collect());
         start = end;
     }

@@ -212,15 +212,19 @@ fn slice_of(data_set: &DataSet, n_file: u64) -> Result<Slice, Obstacle> {
     if !(along_x.min(along_y) > 0.0 && along_x.max(along_y) < MAX_POSITION_MM) {
         return Err(Obstacle::Field { field: "PixelSpacing", found: format!("{along_y}\\{along_x}") });
     }
-    let scale = |field| elements.exactly::<1>(field).map(|[value]| value);
+    // A slice without scaling is its own values; one whose scaling cannot be read would be wrong in silence.
+    let scale = |field, name| match elements.text(field) {
+        None => Ok(None),
+        Some(_) => exactly::<1>(elements, field, name).map(|[value]| Some(value)),
+    };
     let is_dicom_slope = |slope: &f64| *slope != 0.0;
     Ok(Slice {
         position,
         axes,
         spacing: [along_x, along_y],
         stored,
-        slope: scale(tag::SLOPE).filter(is_dicom_slope).unwrap_or(1.0),
-        intercept: scale(tag::INTERCEPT).unwrap_or(0.0),
+        slope: scale(tag::SLOPE, "RescaleSlope")?.filter(is_dicom_slope).unwrap_or(1.0),
+        intercept: scale(tag::INTERCEPT, "RescaleIntercept")?.unwrap_or(0.0),
         padding: padding(elements, stored.is_signed),
         phases: [tag::TEMPORAL, tag::ACQUISITION, tag::ECHO].map(|field| elements.text(field)),
         is_localizer: has_type("LOCALIZER"),

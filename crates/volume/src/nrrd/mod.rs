@@ -98,8 +98,10 @@ fn stream(
     index: u64,
 ) -> Result<Box<dyn VoxelStream>, ReadError> {
     let (inner, outer) = (index % axes.n_inner, index / axes.n_inner);
-    let n_before = outer * axes.volume_bytes * axes.n_inner;
-    let n_after = (axes.n_outer - 1 - outer) * axes.volume_bytes * axes.n_inner;
+    // Declared sizes may be absurd in a text; what is not there is missed when it is passed over.
+    let block_bytes = axes.volume_bytes.saturating_mul(axes.n_inner);
+    let n_before = outer.saturating_mul(block_bytes);
+    let n_after = (axes.n_outer - 1 - outer).saturating_mul(block_bytes);
     let number_bytes = header.scalar.file_bytes();
     let all: Box<dyn VoxelStream> = if header.encoding == Encoding::Ascii {
         let mut numbers = AsciiStream::new(source, header.scalar, axes.data_bytes / number_bytes)?;
