@@ -138,7 +138,7 @@ pub struct Embedded {
 ///
 /// let alone = Params { pso: PsoParams { particles: 1, ..PsoParams::default() }, ..Params::default() };
 /// let error = embed(&tree, &views, &alone, 0, &|_| {}).unwrap_err();
-/// assert_eq!(error.to_string(), "embed: pso.particles: must be from 3 to 1000000, is 1");
+/// assert_eq!(error.to_string(), "pso.particles: must be from 3 to 1000000, is 1");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn embed(

@@ -81,7 +81,9 @@ fn in_round_section(
     } else {
         0.0
     };
-    let is_cut = background.border_mm(center) < distance_mm;
+    // Beyond the outermost voxel centres a point may be, but not a section that is whole.
+    let is_beyond = center != center.clamp(DVec3::ZERO, background.last_mm());
+    let is_cut = is_beyond || background.border_mm(center) < distance_mm;
     if !distance_mm.is_finite() {
         return None;
     }

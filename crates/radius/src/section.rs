@@ -43,6 +43,10 @@ pub(crate) fn through(
     tangent: DVec3,
     radius_mm: f64,
 ) -> Option<Section> {
+    // Without any background there is no tube to cut.
+    if !radius_mm.is_finite() {
+        return None;
+    }
     let spacing = background.spacing_mm();
     let limit_mm = LIMIT_RADII * radius_mm.max(MIN_SPACINGS * spacing.max_element());
     // How far a voxel reaches along the direction.

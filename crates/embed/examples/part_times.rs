@@ -1,6 +1,6 @@
 //! How long each part of `embed` takes on degenerate trees.
 //!
-//! `cargo run --release -p espalier-embed --example degenerate -- NAME[@SIZE]…`, a name one of `binary` (size: depth),
+//! `cargo run --release -p espalier-embed --example part_times -- NAME[@SIZE]…`, a name one of `binary` (size: depth),
 //! `fork` (the same with equal bends in one plane), `star`, `caterpillar`, `comb`, `chain`, `turns` (sizes: nodes).
 //!
 //! One line per tree: nodes N, crossings, mean angle error, E, the seconds of each method, of the search for sides
