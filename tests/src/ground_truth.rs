@@ -5,7 +5,7 @@
 //! **Tips** every free end, the root's too, so that the choice of a root does not count. One to one, nearest first; a
 //! found tip is a true one if it lies within max(2 voxels, the true radius there).
 //! **Off axis** the found centreline in steps of half a smallest spacing, against the nearest point of the true one; mean
-//! over all that is inside the true body (nearer to an axis than its radius), forks included. What is not is `stray`.
+//! over all that is inside the true body (nearer to an axis than its radius or a voxel), forks included. What is not is `stray`.
 //! **Radius** at the same steps, outside of the true forks' spheres: within, the largest sphere is not the tube's.
 //! **Length** of the whole found tree against the whole true tree.
 //! **Angles** at forks that are found within max(2 voxels, the true radius there), one to one, between every two arms. An

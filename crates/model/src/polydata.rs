@@ -9,8 +9,8 @@
 //! **Input** bytes, and how the file's numbers become mm. **Output** [`Polylines`].
 //! **Steps** 1. the format by its first bytes; 2. its arrays; 3. radii by their array's name; 4. the space that the file
 //! states, or else the one that the caller names; 5. RAS+ mm.
-//! **Guarantees** those of [`Polylines`]; memory is proportional to the file, since counts are compared with what it
-//! holds; no recursion; no byte makes it panic.
+//! **Guarantees** those of [`Polylines`]; each array is bounded by what the file can hold when unpacked, but not
+//! their sum: pieces may share bytes; no recursion; no byte makes it panic.
 //! **Source** "VTK File Formats", docs.vtk.org; VMTK's documentation for the names of its arrays.
 
 mod encoded;

@@ -2,8 +2,8 @@
 //!
 //! For each grid, an airway and a vessel tree of the phantom generator, from three masks: the voxels whose centre lies
 //! in the body (`clean`), the same with 15 % of its surface's voxels flipped (`rough`), and what region growing makes of
-//! its noisy CT (`ct`). Columns and tolerances are those of `espalier_tests::ground_truth`. `all` counts every tip of the
-//! truth; what a grid cannot show is part of the figure.
+//! its noisy CT (`ct`). Columns and tolerances are those of `espalier_tests::ground_truth`. Every tip of the truth
+//! counts; what a grid cannot show is part of the figure.
 //! `--small` takes one grid and small trees; `--only WORD` the rows that hold the word.
 #![allow(clippy::print_stdout, clippy::print_stderr, clippy::disallowed_methods, reason = "a program")]
 

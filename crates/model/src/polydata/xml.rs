@@ -151,7 +151,7 @@ fn arrays_of<'a>(data: Option<Node<'a, 'a>>, names: &[&str]) -> Vec<(&'a str, No
     wanted.collect()
 }
 
-/// Appends a piece's numbers to those of the pieces before it; what those lack is 0.
+/// Appends a piece's numbers to those of the pieces before it; what earlier pieces lack is 0.
 fn append(arrays: &mut Vec<(String, Vec<f64>)>, name: &str, n_before: usize, numbers: Vec<f64>) {
     let known = arrays.iter().position(|(known, _)| known == name);
     let index = known.unwrap_or_else(|| {
