@@ -11,6 +11,8 @@ use crate::table::{Column, Table, fixed};
 pub enum LedgerKind {
     /// A connected component that is not part of the tree.
     ComponentDropped,
+    /// A gap of the mask narrower than a ball, filled.
+    GapClosed,
     /// A tunnel of the mask closed by changing a few voxels.
     TunnelClosed,
     /// An edge removed to open a loop.
@@ -32,8 +34,9 @@ pub enum LedgerKind {
 }
 
 impl LedgerKind {
-    const ALL: [Self; 10] = [
+    const ALL: [Self; 11] = [
         Self::ComponentDropped,
+        Self::GapClosed,
         Self::TunnelClosed,
         Self::LoopCut,
         Self::SpurPruned,
@@ -50,6 +53,7 @@ impl LedgerKind {
     pub fn name(self) -> &'static str {
         match self {
             Self::ComponentDropped => "component_dropped",
+            Self::GapClosed => "gap_closed",
             Self::TunnelClosed => "tunnel_closed",
             Self::LoopCut => "loop_cut",
             Self::SpurPruned => "spur_pruned",

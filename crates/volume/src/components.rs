@@ -17,19 +17,19 @@ const MAX_LISTED: usize = 200;
 
 /// Size and place of a component.
 #[derive(Clone, Copy, Default)]
-struct Component {
-    n_voxels: usize,
+pub(crate) struct Component {
+    pub(crate) n_voxels: usize,
     /// The sum of its voxels' coordinates; exact, as whole numbers below 2⁵³ are.
     voxel_sum: DVec3,
 }
 
 impl Component {
-    fn add(&mut self, other: Self) {
+    pub(crate) fn add(&mut self, other: Self) {
         self.n_voxels += other.n_voxels;
         self.voxel_sum += other.voxel_sum;
     }
 
-    fn centroid_mm(&self, grid: &Grid) -> DVec3 {
+    pub(crate) fn centroid_mm(&self, grid: &Grid) -> DVec3 {
         grid.world_from_voxel().transform_point3(self.voxel_sum / self.n_voxels.max(1) as f64)
     }
 }
@@ -78,7 +78,8 @@ fn clear(bits: &mut Bits, runs: &Runs, labelled: &Components, dropped: &[usize])
     }
 }
 
-fn measure(runs: &Runs, labelled: &Components, grid: &Grid) -> Vec<Component> {
+/// Size and place of each component.
+pub(crate) fn measure(runs: &Runs, labelled: &Components, grid: &Grid) -> Vec<Component> {
     let ny = grid.shape()[1];
     let mut components = vec![Component::default(); labelled.n_components];
     for row in 0..runs.n_rows() {

@@ -113,6 +113,31 @@ pub enum Error {
         /// The largest finite value; NaN if there is none.
         max: f64,
     },
+    /// A closing by more voxels than a gap of a mask has.
+    #[error(
+        "a ball of {radius_mm} mm reaches over {n_voxels:.0} voxels, which is more than any gap of a mask"
+    )]
+    Closing {
+        /// The radius asked for.
+        radius_mm: f64,
+        /// How many voxels it reaches along the axis with the smallest spacing.
+        n_voxels: f64,
+        /// The largest radius that is taken, in mm.
+        largest_mm: f64,
+    },
+    /// A spacing at which the volume has no legal grid.
+    #[error("the volume cannot be resampled: {0}")]
+    Grid(espalier_model::GridError),
+    /// A step that needs more memory than allowed.
+    #[error("{what} needs {needed} bytes of memory, allowed are {limit}")]
+    TooLarge {
+        /// The step.
+        what: &'static str,
+        /// How many bytes are needed.
+        needed: u64,
+        /// How many are allowed.
+        limit: u64,
+    },
     /// The region grows with the threshold all the way.
     #[error("the region about the seed grows all the way with the threshold, so where it leaks cannot be told: {}", .curve.map(|(threshold, ml)| format!("{ml:.1} ml at {threshold}")).join(", "))]
     NoKnee {
@@ -135,6 +160,9 @@ impl Diagnose for Error {
             Self::NoLabelMap { .. } => "E-VOLUME-NO-LABELS",
             Self::NoTrachea { .. } => "E-VOLUME-NO-TRACHEA",
             Self::NoKnee { .. } => "E-VOLUME-NO-KNEE",
+            Self::Closing { .. } => "E-VOLUME-CLOSING",
+            Self::Grid(_) => "E-VOLUME-RESAMPLE",
+            Self::TooLarge { .. } => "E-VOLUME-TOO-LARGE",
         }
     }
 
@@ -145,7 +173,10 @@ impl Diagnose for Error {
             Self::MethodNeeded { .. }
             | Self::UnknownLabel { .. }
             | Self::SeedOutside { .. }
-            | Self::SeedOutOfBand { .. } => Class::Usage,
+            | Self::SeedOutOfBand { .. }
+            | Self::Closing { .. }
+            | Self::Grid(_) => Class::Usage,
+            Self::TooLarge { .. } => Class::Limit,
             Self::AbsentLabel { .. } | Self::NoLabelMap { .. } => Class::Input,
             Self::Empty { .. } | Self::NoTrachea { .. } | Self::NoKnee { .. } => Class::Input,
         }
@@ -175,9 +206,21 @@ impl Diagnose for Error {
             Self::NoKnee { .. } => {
                 "set volume.upper (airways) or volume.lower (vessels), or another volume.seed_voxel".to_owned()
             }
+            Self::Closing { largest_mm, .. } => {
+                format!("set volume.closing_mm to {largest_mm:.3} or less, or input.unit if the unit is wrong")
+            }
+            Self::Grid(_) => "set volume.resample_mm to a spacing nearer to the volume's own".to_owned(),
+            Self::TooLarge { .. } => {
+                "allow more with --max-memory, or set volume.closing_mm or volume.resample_mm otherwise".to_owned()
+            }
             Self::SeedOutOfBand { nearest: [x, y, z], .. } => {
                 format!("set seed_voxel = [{x}, {y}, {z}] if that is the organ, or widen the band")
             }
         }
     }
+}
+
+/// Refuses a step that needs more memory than allowed.
+pub(crate) fn check_memory(what: &'static str, needed: u64, limit: u64) -> Result<(), Error> {
+    if needed > limit { Err(Error::TooLarge { what, needed, limit }) } else { Ok(()) }
 }

@@ -9,7 +9,7 @@
 //! | NRRD and MetaImage: headers of text, data files, numbers written out | `nrrd/*`, `metaimage`, `text`, `ascii`, `detached` |
 //! | DICOM: the slices of a folder | `dicom/*` |
 //! | stored numbers of any type and byte order | `decode` |
-//! | sheared axes to orthogonal ones | `orthogonal` |
+//! | what stands between voxels; sheared axes to orthogonal ones | `interpolate`, `orthogonal` |
 //! | **[`read`]**: file → [`Volume`](espalier_model::Volume) | `read` |
 //! | what a volume is: mask, labels, CT | `kind` |
 //! | mask, label, threshold band | `select`, `choose` |
@@ -17,6 +17,8 @@
 //! | region growing from a seed | `region_grow` |
 //! | where a region leaks | `growth` |
 //! | where the trachea is | `trachea` |
+//! | a scan or a mask at another spacing | `resample` |
+//! | gaps closed | `closing` |
 //! | connected components by runs of voxels | `runs`, `components` |
 //! | cavities filled | `cavities` |
 //! | tunnels counted, and closed where they are faults | `euler`, `heal` |
@@ -44,6 +46,7 @@ mod nifti;
 mod nrrd;
 
 mod decode;
+mod interpolate;
 mod orthogonal;
 mod read;
 
@@ -52,11 +55,13 @@ mod growth;
 mod kind;
 mod labels;
 mod region_grow;
+mod resample;
 mod runs;
 mod select;
 mod trachea;
 
 mod cavities;
+mod closing;
 mod components;
 mod euler;
 #[cfg(test)]
@@ -77,7 +82,7 @@ pub use euler::euler_number;
 pub use growth::{GROWTH_COLUMNS, Growth, Knee, Level, Towards};
 pub use kind::{Kind, inspect_kind};
 pub use labels::{Label, Labels};
-pub use params::{AssumedSpace, Components, Method, Params, Preset, ReadOptions};
+pub use params::{AssumedSpace, Components, Method, Params, Preset, ReadOptions, Spacing};
 pub use read::{Loaded, files, read};
 pub use read_error::ReadError;
 pub use read_mask::read_mask;

@@ -4,7 +4,7 @@ use std::fmt;
 
 use espalier_model::diagnose::ParamError;
 use glam::DVec3;
-use serde::de::{self, Visitor};
+use serde::de::{self, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::growth::Towards;
@@ -100,6 +100,16 @@ pub struct Params {
     /// `"lung_vessels, 2"`, `[1, 2]`. Names are those of TotalSegmentator's tasks `total` and `lung_vessels`, and
     /// `airway` for `lung_trachea_bronchia`.
     pub label: Option<Labels>,
+    /// The spacing to work at, in mm: `"isotropic"` for the smallest of the volume's own along every axis, one number
+    /// for all axes, or `[x, y, z]` on the file's own axes; each from 1e-6 to 1000. A scan is resampled by linear
+    /// interpolation before voxels are chosen; of a mask or label map the chosen voxels are, cut at a half. Seeds in
+    /// voxels are the file's. Default: none, the volume's own. Larger: fewer voxels, and thin branches are lost.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub resample_mm: Option<Spacing>,
+    /// The radius in mm of the ball that closes gaps: background that no such ball can reach without touching the mask
+    /// becomes foreground, before components are dropped. From 0 to 1000, and at most 64 voxels. Default 0: nothing is
+    /// closed, for where vessels lie side by side a closing joins them. Larger: wider gaps close.
+    pub closing_mm: f64,
     /// How many 26-connected components stay, the largest first: `"largest"`, `"all"`, or a number from 1.
     /// Default `"largest"`: the islands of a mask are mostly noise, and a tree is one piece.
     pub components: Components,
@@ -126,6 +136,8 @@ impl Default for Params {
             seed_voxel: None,
             seed_mm: None,
             label: None,
+            resample_mm: None,
+            closing_mm: 0.0,
             components: Components::Largest,
             min_component_ml: 0.0,
             fill_cavities: true,
@@ -272,6 +284,85 @@ impl Visitor<'_> for ComponentsVisitor {
     }
 }
 
+/// The distance between voxels that is wanted. In a config `"isotropic"`, a number or three numbers, in mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Spacing {
+    /// The smallest of the volume's own along every axis.
+    Isotropic,
+    /// The same along every axis, in mm.
+    Cubic(f64),
+    /// Along each of the file's axes, in mm.
+    Each([f64; 3]),
+}
+
+impl Spacing {
+    /// Along each axis, in mm, for a volume whose own is `own_mm`.
+    #[must_use]
+    pub fn mm(self, own_mm: DVec3) -> DVec3 {
+        match self {
+            Self::Isotropic => DVec3::splat(own_mm.min_element()),
+            Self::Cubic(mm) => DVec3::splat(mm),
+            Self::Each(mm) => DVec3::from_array(mm),
+        }
+    }
+}
+
+impl Serialize for Spacing {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Isotropic => serializer.serialize_str("isotropic"),
+            Self::Cubic(mm) => serializer.serialize_f64(*mm),
+            Self::Each(mm) => mm.serialize(serializer),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Spacing {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(SpacingVisitor)
+    }
+}
+
+struct SpacingVisitor;
+
+impl<'de> Visitor<'de> for SpacingVisitor {
+    type Value = Spacing;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("\"isotropic\", a number of mm, or three of them")
+    }
+
+    fn visit_str<E: de::Error>(self, text: &str) -> Result<Spacing, E> {
+        match text {
+            "isotropic" => Ok(Spacing::Isotropic),
+            _ => Err(E::invalid_value(de::Unexpected::Str(text), &self)),
+        }
+    }
+
+    fn visit_f64<E: de::Error>(self, mm: f64) -> Result<Spacing, E> {
+        Ok(Spacing::Cubic(mm))
+    }
+
+    fn visit_i64<E: de::Error>(self, mm: i64) -> Result<Spacing, E> {
+        Ok(Spacing::Cubic(mm as f64))
+    }
+
+    fn visit_u64<E: de::Error>(self, mm: u64) -> Result<Spacing, E> {
+        Ok(Spacing::Cubic(mm as f64))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Spacing, A::Error> {
+        let mut each = [0.0; 3];
+        for (axis, mm) in each.iter_mut().enumerate() {
+            *mm = list.next_element()?.ok_or_else(|| de::Error::invalid_length(axis, &self))?;
+        }
+        match list.next_element::<f64>()? {
+            Some(_) => Err(de::Error::invalid_length(4, &self)),
+            None => Ok(Spacing::Each(each)),
+        }
+    }
+}
+
 impl Params {
     /// Checks each value, and that no key is set that the method would not look at.
     ///
@@ -303,6 +394,12 @@ impl Params {
         ParamError::check("label", are_legal, "must be a finite number, a name, or several of them")?;
         let needs_label = method == Method::Label && self.label.is_none();
         ParamError::check("label", !needs_label, "must be set with method = \"label\"")?;
+        let spacing = self.resample_mm.map_or(DVec3::ONE, |spacing| spacing.mm(DVec3::ONE));
+        let is_spacing = spacing.to_array().iter().all(|mm| (1e-6..=1e3).contains(mm));
+        ParamError::check("resample_mm", is_spacing, format!("must be from 1e-6 to 1000, is {spacing}"))?;
+        let closing = self.closing_mm;
+        let message = format!("must be from 0 to 1000, is {closing}");
+        ParamError::check("closing_mm", (0.0..=1e3).contains(&closing), message)?;
         let keeps_one = self.components.limit() > 0;
         ParamError::check("components", keeps_one, "must be \"largest\", \"all\" or a number from 1, is 0")?;
         let least = self.min_component_ml;

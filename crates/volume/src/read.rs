@@ -65,10 +65,7 @@ fn read_any(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
     stored.stream.finish(&mut report)?;
     let (grid, voxels) = match grid {
         Some(grid) => (grid, voxels),
-        None => {
-            let affine = stored.world_from_voxel;
-            orthogonal::resample(&voxels, stored.shape, affine, options.max_bytes, &mut report)?
-        }
+        None => orthogonal::resample(&voxels, &stored, options.max_bytes, &mut report)?,
     };
     count_grid(&grid, &mut report);
     let volume = Volume::new(grid, voxels, stored.slope, stored.intercept);

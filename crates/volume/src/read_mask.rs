@@ -3,8 +3,8 @@
 //! **Input** a path to a volume file, and [`Params`]. **Output** [`Segmented`], whose report begins with the reader's.
 //! **Steps** 1. where the choice depends on each value alone, the bits of the voxels straight from the file, and what
 //! kind of volume it is; 2. else, for DICOM slices, or where sheared axes must be made orthogonal, the whole volume;
-//! 3. what [`segment`] does then.
-//! **Guarantees** the same result as [`read`] and [`segment`]; straight from the file, memory is the bits.
+//! 3. what [`segment`](crate::segment) does then.
+//! **Guarantees** the same result as [`read`] and [`segment`](crate::segment); straight from the file, memory is the bits.
 //! **Cost** one pass over the file; a second one for a mask of which some values are not finite, and for a volume of
 //! more than two values that is to be taken for a mask but does not begin with 0.
 
@@ -14,16 +14,16 @@ use espalier_model::{Bits, Report};
 
 use crate::dicom;
 use crate::read::{check_limit, count_grid, orthogonal_grid};
-use crate::segment::segment_selection;
+use crate::segment::{segment_selection, segment_within};
 use crate::select::{MASK, Selection, Wish, background, is_in_mask, needs_preset, wish};
 use crate::stored::Stored;
 use crate::stream::{self, Inspected};
-use crate::{Error, Kind, Params, ReadError, ReadOptions, Segmented, read, segment};
+use crate::{Error, Kind, Method, Params, ReadError, ReadOptions, Segmented, read};
 
 /// Reads the volume in a file and makes a mask of it.
 ///
 /// # Errors
-/// As [`read`] and [`segment`].
+/// As [`read`] and [`segment`](crate::segment).
 pub fn read_mask(path: &Path, options: &ReadOptions, params: &Params) -> Result<Segmented, Error> {
     params.validate()?;
     let file = File { path, options };
@@ -41,7 +41,7 @@ pub fn read_mask(path: &Path, options: &ReadOptions, params: &Params) -> Result<
         return file.segment_whole(params);
     };
     count_grid(&grid, &mut report);
-    let segmented = segment_selection(selection, &grid, params, || {
+    let segmented = segment_selection(selection, &grid, (params, options.max_bytes), || {
         let mut stored = file.open(&mut Report::default())?;
         let census = file.named(stream::inspect(&mut stored, &mut Report::default()))?.census;
         Ok((census.min, census.max))
@@ -68,7 +68,8 @@ impl File<'_> {
 
     fn segment_whole(&self, params: &Params) -> Result<Segmented, Error> {
         let loaded = read(self.path, self.options)?;
-        Ok(after(loaded.report, segment(&loaded.volume, params)?))
+        let segmented = segment_within(&loaded.volume, params, self.options.max_bytes)?;
+        Ok(after(loaded.report, segmented))
     }
 
     fn named<T>(&self, result: Result<T, ReadError>) -> Result<T, Error> {
@@ -84,6 +85,10 @@ impl File<'_> {
     ) -> Result<Option<Selection>, Error> {
         match wish(params) {
             Wish::Names(_) | Wish::Region => Ok(None),
+            // A scan is resampled before voxels are chosen.
+            Wish::Values { .. } if params.method == Method::Threshold && params.resample_mm.is_some() => {
+                Ok(None)
+            }
             Wish::Values { is_wanted, what } => {
                 self.named(check_limit(bits_bytes(stored), self.options))?;
                 let bits = self.named(stream::choose(stored, is_wanted, report))?;

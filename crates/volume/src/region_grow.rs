@@ -21,7 +21,7 @@ use crate::trachea::SeedCandidate;
 use crate::{Error, Params, Preset, growth, trachea};
 
 /// The seed of the parameters as a voxel inside the grid.
-fn seed_voxel(grid: &Grid, params: &Params) -> Result<[usize; 3], Error> {
+pub(crate) fn seed_voxel(grid: &Grid, params: &Params) -> Result<[usize; 3], Error> {
     let shape = grid.shape();
     let inside = |[x, y, z]: [i64; 3]| grid.voxel_at(DVec3::new(x as f64, y as f64, z as f64));
     let (found, shown) = match (params.seed_voxel, params.seed_mm) {

@@ -1,20 +1,27 @@
 //! [`Volume`] → [`Mask`].
 //!
 //! **Input** a volume and [`Params`]. **Output** [`Segmented`].
-//! **Steps** 1. choose the organ's voxels by value, or by growing from a seed; 2. drop all but the largest
-//! components; 3. fill cavities; 4. close tunnels that are faults of the mask.
-//! **Guarantees** the mask has at least one voxel, and the volume's grid; every step's effect is in the report.
+//! **Steps** 0. a scan that is wanted at another spacing is resampled; 1. choose the organ's voxels by value, or by
+//! growing from a seed; 2. a mask that is wanted at another spacing is resampled; 3. close gaps; 4. drop all but the
+//! largest components; 5. fill cavities; 6. close tunnels that are faults of the mask.
+//! **Guarantees** the mask has at least one voxel, and the volume's grid unless another spacing was asked for; every
+//! step's effect is in the report.
 
-use espalier_model::{Bits, Grid, Ledger, LedgerEntry, Mask, Report, Volume};
+use espalier_model::{Bits, Grid, Ledger, Mask, Report, Volume};
+use glam::DVec3;
 
+use crate::cavities::Cavities;
 use crate::euler::euler_number;
 use crate::growth::Growth;
 use crate::heal::Healed;
 use crate::kind::Census;
 use crate::runs::{Connectivity, Runs};
-use crate::select::{Selection, select};
+use crate::select::{Selection, needs_preset, select};
 use crate::trachea::SeedCandidate;
-use crate::{Error, Params, cavities, components, heal};
+use crate::{
+    Error, Method, Params, ReadOptions, cavities, closing, components, heal, inspect_kind, region_grow,
+    resample,
+};
 
 /// How often places to close tunnels are looked for; on the masks at hand the second pass finds a few, the third
 /// none.
@@ -25,10 +32,10 @@ const MAX_PASSES: usize = 4;
 pub struct Segmented {
     /// The organ.
     pub mask: Mask,
-    /// An entry for each component that was dropped, largest first, beyond 200 one for all others; then an entry for
+    /// An entry for each gap that was closed, largest first, beyond 200 one for all others; for each component that was dropped, largest first, beyond 200 one for all others; then an entry for
     /// each place at which a tunnel was closed.
     pub ledger: Ledger,
-    /// Counts `selected_voxels`, `selected_ml`, `components`, `components_dropped`, `components_dropped_voxels`,
+    /// Counts `selected_voxels`, `selected_ml`, where gaps were closed `closing_patches`, `closing_filled_voxels`; `components`, `components_dropped`, `components_dropped_voxels`,
     /// `component_largest_voxels`, `component_dropped_largest_voxels`, `cavities_filled`,
     /// `cavities_filled_voxels`, `tunnels`, `foreground_voxels`, `foreground_ml`. Where tunnels were closed also
     /// `tunnels_left`, `tunnel_repairs`, `tunnel_repairs_filled_voxels`, `tunnel_repairs_cleared_voxels`. Of a region
@@ -57,13 +64,49 @@ pub struct Segmented {
 /// [`Error`] for parameters out of range, a volume that needs a method, a seed outside the volume or the band,
 /// and for a choice without any voxel.
 pub fn segment(volume: &Volume, params: &Params) -> Result<Segmented, Error> {
+    segment_within(volume, params, ReadOptions::default().max_bytes)
+}
+
+/// [`segment`], where no step takes more than `max_bytes` of memory at a time.
+pub(crate) fn segment_within(volume: &Volume, params: &Params, max_bytes: u64) -> Result<Segmented, Error> {
     params.validate()?;
-    let selection = select(volume, params)?;
-    segment_selection(selection, volume.grid(), params, || {
+    let wanted = params.resample_mm.filter(|_| is_scan(volume, params));
+    let mut report = Report::default();
+    let resampled = match wanted {
+        Some(spacing) => resample::scan(volume, spacing, max_bytes, &mut report)?,
+        None => None,
+    };
+    let mut params = params.clone();
+    if wanted.is_some() {
+        params.resample_mm = None;
+    }
+    if resampled.is_some() && params.has_seed() {
+        // A seed in voxels is meant on the file's own axes.
+        let [x, y, z] = region_grow::seed_voxel(volume.grid(), &params)?.map(|coordinate| coordinate as f64);
+        let seed_mm = volume.grid().world_from_voxel().transform_point3(DVec3::new(x, y, z));
+        (params.seed_voxel, params.seed_mm) = (None, Some(seed_mm.to_array()));
+    }
+    let volume = resampled.as_ref().unwrap_or(volume);
+    let selection = select(volume, &params)?;
+    let segmented = segment_selection(selection, volume.grid(), (&params, max_bytes), || {
         let mut census = Census::default();
         volume.for_each_value(|value| census.see(value));
         Ok((census.min, census.max))
-    })
+    })?;
+    report.extend(segmented.report);
+    Ok(Segmented { report, ..segmented })
+}
+
+/// Whether voxels are chosen by intensities.
+fn is_scan(volume: &Volume, params: &Params) -> bool {
+    match params.method {
+        Method::Threshold | Method::RegionGrow => true,
+        Method::Mask | Method::Label => false,
+        Method::Auto => {
+            let may_be = params.label.is_none() && params.preset.is_some();
+            may_be && needs_preset(&inspect_kind(volume), params.method)
+        }
+    }
 }
 
 /// What [`segment`] does once the voxels are chosen. `range` tells the smallest and the largest finite value, for a
@@ -71,7 +114,7 @@ pub fn segment(volume: &Volume, params: &Params) -> Result<Segmented, Error> {
 pub(crate) fn segment_selection(
     selection: Selection,
     grid: &Grid,
-    params: &Params,
+    (params, max_bytes): (&Params, u64),
     range: impl FnOnce() -> Result<(f64, f64), Error>,
 ) -> Result<Segmented, Error> {
     let mut report = selection.report;
@@ -83,7 +126,7 @@ pub(crate) fn segment_selection(
     if n_selected == grid.n_voxels() {
         report.warn("W-VOLUME-FULL", format!("{} holds every voxel of the volume", selection.what));
     }
-    let cleaned = clean(Mask::new(grid.clone(), selection.bits), params)?;
+    let cleaned = clean_within(Mask::new(grid.clone(), selection.bits), params, max_bytes)?;
     report.extend(cleaned.report);
     Ok(Segmented { report, growth: selection.growth, seeds: selection.seeds, ..cleaned })
 }
@@ -93,8 +136,17 @@ pub(crate) fn segment_selection(
 /// # Errors
 /// [`Error`] for parameters out of range, and for a mask of which nothing is left.
 pub fn clean(mask: Mask, params: &Params) -> Result<Segmented, Error> {
+    clean_within(mask, params, ReadOptions::default().max_bytes)
+}
+
+/// [`clean`], where no step takes more than `max_bytes` of memory at a time.
+fn clean_within(mask: Mask, params: &Params, max_bytes: u64) -> Result<Segmented, Error> {
     params.validate()?;
     let mut report = Report::default();
+    let mask = match params.resample_mm {
+        Some(spacing) => resample::mask(mask, spacing, max_bytes, &mut report)?,
+        None => mask,
+    };
     let grid = mask.grid().clone();
     let millilitres = |n_voxels: usize| n_voxels as f64 * grid.voxel_volume_mm3() / 1000.0;
     let mut bits = mask.into_bits();
@@ -102,25 +154,44 @@ pub fn clean(mask: Mask, params: &Params) -> Result<Segmented, Error> {
     report.count_usize("selected_voxels", n_selected);
     report.count("selected_ml", millilitres(n_selected));
 
+    // Close gaps.
+    let mut closed = Vec::new();
+    if params.closing_mm > 0.0 {
+        let filled = closing::close(&mut bits, &grid, params.closing_mm, max_bytes)?;
+        report.count_usize("closing_patches", filled.n_patches);
+        report.count_usize("closing_filled_voxels", filled.n_voxels);
+        closed = filled.entries;
+    }
+
     // Drop all but the largest components.
     let runs = Runs::cut(&bits);
-    let (mut ledger, n_dropped) = components::keep(&mut bits, &runs, &grid, params, &mut report);
+    let (dropped, n_dropped) = components::keep(&mut bits, &runs, &grid, params, &mut report);
+    let mut ledger = Ledger(closed);
+    ledger.0.extend(dropped.0);
     let runs = if n_dropped > 0 { Runs::cut(&bits) } else { runs };
 
     // Fill cavities, and count tunnels, which closed cavities cannot be mistaken for.
     let cavities = cavities::find(&runs, grid.shape());
     let n_components = report.get("components").unwrap_or(0.0) as i64 - n_dropped as i64;
     let n_tunnels = n_components + cavities.n_cavities as i64 - euler_number(&bits);
+    let mut filled = Filled::default();
     if params.fill_cavities {
-        cavities::fill(&mut bits, &cavities);
-        report.count_usize("cavities_filled", cavities.n_cavities);
-        report.count_usize("cavities_filled_voxels", cavities.n_voxels);
+        filled.fill(&mut bits, &cavities);
+    }
+    // Close tunnels that are faults of the mask, and fill what that closes in.
+    let healed =
+        (params.close_tunnels && n_tunnels > 0).then(|| close_tunnels(&mut bits, &grid, params, &mut filled));
+    if params.fill_cavities {
+        report.count_usize("cavities_filled", filled.n_cavities);
+        report.count_usize("cavities_filled_voxels", filled.n_voxels);
     }
     report.count("tunnels", n_tunnels as f64);
-
-    // Close tunnels that are faults of the mask.
-    if params.close_tunnels && n_tunnels > 0 {
-        ledger.0.extend(close_tunnels(&mut bits, &grid, params, &mut report));
+    if let Some((healed, n_left)) = healed {
+        report.count("tunnels_left", n_left as f64);
+        report.count_usize("tunnel_repairs", healed.n_patches);
+        report.count_usize("tunnel_repairs_filled_voxels", healed.n_filled);
+        report.count_usize("tunnel_repairs_cleared_voxels", healed.n_cleared);
+        ledger.0.extend(healed.entries);
     }
     let mask = Mask::new(grid.clone(), bits);
     let n_foreground = mask.n_foreground();
@@ -133,8 +204,24 @@ pub fn clean(mask: Mask, params: &Params) -> Result<Segmented, Error> {
     Ok(Segmented { mask, ledger, report, growth: None, seeds: Vec::new() })
 }
 
-/// Closes tunnels, and fills what that may have closed in, until no place is left to be changed.
-fn close_tunnels(bits: &mut Bits, grid: &Grid, params: &Params, report: &mut Report) -> Vec<LedgerEntry> {
+/// Cavities that were filled.
+#[derive(Default)]
+struct Filled {
+    n_cavities: usize,
+    n_voxels: usize,
+}
+
+impl Filled {
+    fn fill(&mut self, bits: &mut Bits, cavities: &Cavities) {
+        cavities::fill(bits, cavities);
+        self.n_cavities += cavities.n_cavities;
+        self.n_voxels += cavities.n_voxels;
+    }
+}
+
+/// Closes tunnels, and fills what that may have closed in, until no place is left to be changed; also tells how many
+/// tunnels are left.
+fn close_tunnels(bits: &mut Bits, grid: &Grid, params: &Params, filled: &mut Filled) -> (Healed, i64) {
     let mut all = Healed::default();
     let mut n_left = 0;
     for _ in 0..MAX_PASSES {
@@ -144,7 +231,7 @@ fn close_tunnels(bits: &mut Bits, grid: &Grid, params: &Params, report: &mut Rep
         let n_components = runs.components(Connectivity::All).n_components;
         n_left = (n_components + cavities.n_cavities) as i64 - euler_number(bits);
         if params.fill_cavities {
-            cavities::fill(bits, &cavities);
+            filled.fill(bits, &cavities);
         }
         let is_done = healed.n_patches == 0 || n_left == 0;
         all.add(healed);
@@ -152,9 +239,5 @@ fn close_tunnels(bits: &mut Bits, grid: &Grid, params: &Params, report: &mut Rep
             break;
         }
     }
-    report.count("tunnels_left", n_left as f64);
-    report.count_usize("tunnel_repairs", all.n_patches);
-    report.count_usize("tunnel_repairs_filled_voxels", all.n_filled);
-    report.count_usize("tunnel_repairs_cleared_voxels", all.n_cleared);
-    all.entries
+    (all, n_left)
 }

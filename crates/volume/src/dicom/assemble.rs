@@ -18,6 +18,7 @@ use super::pixels;
 use super::resample::{self, Plan};
 use super::series::{Image, own_name};
 use super::stack::Stack;
+use crate::interpolate::Number;
 use crate::{ReadError, ReadOptions};
 
 /// RAS+ from LPS+.
@@ -37,10 +38,8 @@ pub(crate) struct Assembled {
 }
 
 /// A type of stored numbers.
-pub(super) trait Stored: Copy + Default + PartialOrd + Send + Sync {
+pub(super) trait Stored: Number {
     fn of_stored(value: i32, slice: &Slice) -> Self;
-    fn to_f64(self) -> f64;
-    fn of_f64(value: f64) -> Self;
 }
 
 macro_rules! stored_integer {
@@ -48,12 +47,6 @@ macro_rules! stored_integer {
         impl Stored for $type {
             fn of_stored(value: i32, _: &Slice) -> Self {
                 value as Self
-            }
-            fn to_f64(self) -> f64 {
-                f64::from(self)
-            }
-            fn of_f64(value: f64) -> Self {
-                (value + 0.5).floor() as Self
             }
         }
     };
@@ -65,12 +58,6 @@ stored_integer!(u16);
 impl Stored for f32 {
     fn of_stored(value: i32, slice: &Slice) -> Self {
         (slice.slope * f64::from(value) + slice.intercept) as Self
-    }
-    fn to_f64(self) -> f64 {
-        f64::from(self)
-    }
-    fn of_f64(value: f64) -> Self {
-        value as Self
     }
 }
 
@@ -95,7 +82,7 @@ pub(super) fn assemble(
         })
     };
     let (slope, intercept) = if is_uniform { (first.slope, first.intercept) } else { (1.0, 0.0) };
-    let job = Job { stack, options };
+    let job = Job { stack, options, scaling: (slope, intercept) };
     let (shape, lps_from_voxel, voxels) = if !is_uniform {
         report.count_usize("dicom_scalings", count_scalings(stack));
         let (shape, affine, array) = job.run(report)?;
@@ -132,6 +119,8 @@ fn count_scalings(stack: &Stack) -> usize {
 struct Job<'a> {
     stack: &'a Stack,
     options: &'a ReadOptions,
+    /// Slope and intercept of the numbers in the volume.
+    scaling: (f64, f64),
 }
 
 impl Job<'_> {
@@ -159,7 +148,7 @@ impl Job<'_> {
             return Ok((shape, self.even_affine(), array));
         };
         let mut new = allocate::<T>(plan.shape)?;
-        resample::resample(&voxels, &plan, &mut new, report);
+        resample::resample((&voxels, self.scaling), &plan, &mut new, report);
         let shape = plan.shape;
         Ok((shape, plan.lps_from_voxel, as_array(new, shape)?))
     }

@@ -4,8 +4,8 @@
 //! **Steps** 1. the grid: the slices' own axes and pixel spacing; along the normal the distance that a quarter of the
 //! slices keep or undercut, stretched so that the first and the last plane lie on the first and the last slice;
 //! aside, room for every slice; 2. each plane between the two slices around it: linear along the normal, bilinear
-//! within each slice, since the slices lie aside of each other; values that are labels are taken from the nearest
-//! voxel; 3. outside the slices the smallest value of all, which is air in a CT.
+//! within each slice, since the slices lie aside of each other; masks and labels by the policy of
+//! [`interpolate`](crate::interpolate); 3. outside the slices the smallest value of all, which is air in a CT.
 //! **Guarantees** a value stands where the headers say it was measured, in mm; on a slice that needs no shift by
 //! parts of a pixel the values are the slice's own.
 //! **Cost** O(new voxels), in parallel over planes.
@@ -14,11 +14,8 @@ use espalier_model::Report;
 use glam::{DAffine3, DVec2};
 use rayon::prelude::*;
 
-use super::assemble::Stored;
 use super::stack::Stack;
-
-/// Volumes of at most so many distinct whole numbers are label maps: between labels there is nothing to interpolate.
-const MAX_LABELS: usize = 64;
+use crate::interpolate::{Between, Number, Policy};
 
 /// The grid, and where the slices lie on it.
 pub(super) struct Plan {
@@ -66,15 +63,18 @@ impl Plan {
     }
 }
 
-/// Fills `new`, which has the plan's shape.
-pub(super) fn resample<T: Stored>(old: &[T], plan: &Plan, new: &mut [T], report: &mut Report) {
-    let fill = old.iter().copied().reduce(|a, b| if b < a { b } else { a }).unwrap_or_default();
-    let labels = are_labels(old);
+/// Fills `new`, which has the plan's shape, from numbers and their scaling.
+pub(super) fn resample<T: Number>(
+    (old, scaling): (&[T], (f64, f64)),
+    plan: &Plan,
+    new: &mut [T],
+    report: &mut Report,
+) {
     let [nx, ny, nz] = plan.shape;
-    let sampler = Sampler { old, plan, fill, labels };
+    let sampler = Sampler { old, plan, between: Between::of(old, scaling) };
     new.par_chunks_mut(nx * ny).enumerate().for_each(|(z, plane)| sampler.fill_plane(z, plane));
     let [ox, oy] = plan.old_size;
-    let how = if labels { "the nearest voxel, since they are labels" } else { "linear interpolation" };
+    let how = sampler.between.words();
     let n_slices = plan.heights.len();
     report.warn(
         "W-DICOM-RESAMPLED",
@@ -84,31 +84,13 @@ pub(super) fn resample<T: Stored>(old: &[T], plan: &Plan, new: &mut [T], report:
     );
 }
 
-fn are_labels<T: Stored>(values: &[T]) -> bool {
-    let mut distinct: Vec<T> = Vec::new();
-    let mut last = None;
-    for &value in values {
-        if last == Some(value) || distinct.contains(&value) {
-            last = Some(value);
-            continue;
-        }
-        last = Some(value);
-        distinct.push(value);
-        if distinct.len() > MAX_LABELS {
-            return false;
-        }
-    }
-    true
-}
-
 struct Sampler<'a, T> {
     old: &'a [T],
     plan: &'a Plan,
-    fill: T,
-    labels: bool,
+    between: Between<T>,
 }
 
-impl<T: Stored> Sampler<'_, T> {
+impl<T: Number> Sampler<'_, T> {
     fn fill_plane(&self, z: usize, plane: &mut [T]) {
         let heights = &self.plan.heights;
         let here = z as f64;
@@ -118,8 +100,8 @@ impl<T: Stored> Sampler<'_, T> {
         let [nx, _, _] = self.plan.shape;
         for (index, voxel) in plane.iter_mut().enumerate() {
             let point = DVec2::new((index % nx) as f64, (index / nx) as f64);
-            *voxel = if self.labels {
-                self.nearest(below + usize::from(share >= 0.5), point).unwrap_or(self.fill)
+            *voxel = if self.between.policy == Policy::Labels {
+                self.nearest(below + usize::from(share >= 0.5), point).unwrap_or(self.between.fill)
             } else {
                 self.blend(below, share, point)
             };
@@ -132,10 +114,10 @@ impl<T: Stored> Sampler<'_, T> {
         let lower = if share < 1.0 { self.bilinear(below, point) } else { None };
         let upper = if share > 0.0 { self.bilinear(below + 1, point) } else { None };
         match (lower, upper) {
-            (Some(a), Some(b)) => T::of_f64(a + share * (b - a)),
-            (Some(a), None) if share < 0.5 => T::of_f64(a),
-            (None, Some(b)) if share >= 0.5 => T::of_f64(b),
-            _ => self.fill,
+            (Some(a), Some(b)) => self.between.settle(a + share * (b - a)),
+            (Some(a), None) if share < 0.5 => self.between.settle(a),
+            (None, Some(b)) if share >= 0.5 => self.between.settle(b),
+            _ => self.between.fill,
         }
     }
 
