@@ -44,13 +44,26 @@ pub(crate) struct Common {
     /// Change a config key, such as embed.w_angle=3; may be given many times
     #[arg(long = "set", value_name = "KEY=VALUE", global = true, value_parser = parse_override)]
     pub(crate) overrides: Vec<Override>,
-    /// What a scan shows: airway (grown from the trachea, which is found) or vessel (with contrast); short for
-    /// --set volume.preset, and for airway --set tree.root=superior
+    /// What a scan shows: airway (grown from the trachea, which is found; the tree's root is then the superior tip,
+    /// unless tree.root is set) or vessel (with contrast); short for --set volume.preset
     #[arg(long, global = true, value_name = "airway|vessel", value_parser = ["airway", "vessel"])]
     pub(crate) preset: Option<String>,
     /// The organ in a label map, by value or name, several with commas; short for --set volume.label
     #[arg(long, global = true, value_name = "LABEL")]
     pub(crate) label: Option<String>,
+    /// A file with the names of a label map's values, for --label (ITK-SNAP, 3D Slicer, BIDS, JSON, or lines "1 left
+    /// lung"); short for --set input.labels
+    #[arg(long, global = true, value_name = "FILE")]
+    pub(crate) labels: Option<PathBuf>,
+    /// Which volume of a 4D file, from 0; the same as --set input.volume_index=N
+    #[arg(long, global = true, value_name = "N")]
+    pub(crate) volume_index: Option<u32>,
+    /// The space of a file that does not name its own: where its axes point; the same as --set input.assume_space=…
+    #[arg(long, global = true, value_name = "ras|las|lps", value_parser = ["ras", "las", "lps"])]
+    pub(crate) assume_space: Option<String>,
+    /// Refuse what would otherwise be repaired with a warning; the same as --set input.strict=true
+    #[arg(long, global = true)]
+    pub(crate) strict: bool,
     /// Which DICOM series of a folder, from 1 as the message lists them; the same as --set input.series=N
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) series: Option<u32>,
@@ -74,15 +87,21 @@ impl Arguments {
     pub(crate) fn with_all_overrides(mut self) -> Self {
         let set = |key: &str, value: String| Override { key: key.to_owned(), value };
         let common = &mut self.common;
-        let root = common.preset.as_ref().filter(|preset| *preset == "airway");
-        let root = root.map(|_| set("tree.root", "superior".to_owned()));
         let preset = common.preset.take().map(|preset| set("volume.preset", preset));
-        common.overrides.splice(..0, preset.into_iter().chain(root));
+        common.overrides.splice(..0, preset);
         // Quoted, so that numbers with commas stay one value.
         let label = common.label.take().map(|label| set("volume.label", format!("{label:?}")));
         let series = common.series.map(|index| set("input.series", index.to_string()));
         let resample = common.resample.then(|| set("input.resample", "true".to_owned()));
-        common.overrides.extend(label.into_iter().chain(series).chain(resample));
+        // From here, not from the config's folder.
+        let from_here = |path: PathBuf| std::path::absolute(&path).unwrap_or(path);
+        let labels = common.labels.take().map(|path| set("input.labels", format!("{:?}", from_here(path))));
+        let index = common.volume_index.map(|index| set("input.volume_index", index.to_string()));
+        let space = common.assume_space.take().map(|space| set("input.assume_space", space));
+        let strict = common.strict.then(|| set("input.strict", "true".to_owned()));
+        common
+            .overrides
+            .extend([label, labels, index, space, strict, series, resample].into_iter().flatten());
         self
     }
 }

@@ -93,7 +93,9 @@ fn run_pipeline(arguments: &Arguments, run: &RunArguments) -> anyhow::Result<Sum
 fn run_compare(arguments: &Arguments, compare: &CompareArguments) -> anyhow::Result<Summary> {
     let overrides = &arguments.common.overrides;
     let subject = |path: &PathBuf| {
-        if path.is_dir() {
+        // A folder that is no run but has DICOM slices in it is an input.
+        let is_input = !is_run(path) && espalier_pipeline::is_dicom_folder(path);
+        if path.is_dir() && !is_input {
             Ok(Subject::Run(path.clone()))
         } else {
             load(path, overrides).map(|loaded| Subject::Config(Box::new(loaded)))

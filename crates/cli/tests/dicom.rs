@@ -120,3 +120,22 @@ fn series_and_resampling_are_chosen() {
     let (code, text) = run(&["--set", "input.series=0"]);
     assert!(code == Some(2) && text.contains("series count from 1"), "{text}");
 }
+
+/// A folder of slices is an input wherever a config or another input is.
+#[test]
+fn a_series_is_compared_and_swept_like_any_input() {
+    let mut slices = stack(&[0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
+    slices.iter_mut().for_each(|slice| slice.values.fill(100));
+    let folder = scan(&slices);
+    let band = ["--set", "volume.method=threshold", "--set", "volume.lower=-2000", "-q"];
+    for arguments in [
+        ["compare", "scan", "-o", "compared"].as_slice(),
+        &["sweep", "scan", "--over", "embed.w_length=1,2", "-o", "swept"],
+    ] {
+        let output = espalier(folder.path(), &[arguments, &band].concat());
+        let text = stderr(&output);
+        // Six slices of a few pixels are no tree, which is told by the stage that finds out.
+        assert!(!text.contains("holds no run"), "{text}");
+        assert!(output.status.success() || text.contains("skeleton") || text.contains("tree"), "{text}");
+    }
+}

@@ -4,14 +4,15 @@
 //! |---|---|
 //! | [`slicer_colors`] | `branches.ctbl`, a colour table of 3D Slicer |
 //! | [`snap_labels`] | `branches.label.txt`, a label description of ITK-SNAP |
-//! | [`parse_names`] | names of a label map's values, in either format or as plain lines |
+//! | [`parse_names`] | names of a label map's values, from these and other tables |
 //!
 //! **Guarantees** colours are whole-number arithmetic on the branch's index, so a branch has the same colour everywhere.
 
-use std::collections::BTreeMap;
+mod names;
+
 use std::fmt::Write as _;
 
-use crate::FileError;
+pub use names::parse_names;
 
 /// A turn of the colour wheel in whole steps.
 const TURN: u32 = 6 * 256;
@@ -62,68 +63,9 @@ fn color(branch: usize) -> [u32; 3] {
     }
 }
 
-/// The names of a label map's values.
-///
-/// A line is `value name`, `value name R G B A` as in 3D Slicer, or `value R G B A VIS MSH "name"` as in ITK-SNAP; between
-/// value and name stand spaces, tabs, a comma or a colon; `#` begins a comment. Of two names the later holds.
-///
-/// # Errors
-/// [`FileError::Invalid`] with the line that does not begin with a whole number or has no name.
-pub fn parse_names(text: &str) -> Result<BTreeMap<i64, String>, FileError> {
-    let mut names = BTreeMap::new();
-    for (line_idx, line) in text.trim_start_matches('\u{FEFF}').lines().enumerate() {
-        let line = line.trim();
-        if line.is_empty() || line.starts_with('#') {
-            continue;
-        }
-        let (value, name) = parse_name(line).ok_or_else(|| FileError::Invalid {
-            format: "label names",
-            what: format!("line {} is no value and name: {line:.60}", line_idx + 1),
-        })?;
-        names.insert(value, name);
-    }
-    Ok(names)
-}
-
-fn parse_name(line: &str) -> Option<(i64, String)> {
-    let is_gap = |letter: char| letter.is_whitespace() || letter == ',' || letter == ':';
-    let (value, rest) = line.split_once(is_gap)?;
-    let (value, rest) = (value.parse().ok()?, rest.trim_matches(is_gap));
-    if let Some((_, quoted)) = rest.split_once('"') {
-        return Some((value, quoted.split('"').next().unwrap_or_default().to_owned()));
-    }
-    let words: Vec<&str> = rest.split_whitespace().collect();
-    let is_slicer = words.len() == 5 && words[1..].iter().all(|word| word.parse::<f64>().is_ok());
-    let name = if is_slicer { words[0].to_owned() } else { words.join(" ") };
-    (!name.is_empty()).then_some((value, name))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn names_of_three_formats() {
-        let text = "\u{FEFF}# lobes\n1 left upper lobe\n2,lower\n3: middle\n4 right_upper 10 20 30 255\n5 1 2 3 1 1 1 \"right \
-                    lower\"\n\n-6\tnegative\r\n";
-        let names = parse_names(text).expect("names");
-        let expected = ["negative", "left upper lobe", "lower", "middle", "right_upper", "right lower"];
-        assert_eq!(names.keys().copied().collect::<Vec<_>>(), [-6, 1, 2, 3, 4, 5]);
-        assert_eq!(names.values().map(String::as_str).collect::<Vec<_>>(), expected);
-        for bad in ["lobe 1\n", "1\n", "1 \n", "1.5 x\n", "1 ,\n"] {
-            assert!(parse_names(bad).is_err(), "{bad:?}");
-        }
-    }
-
-    #[test]
-    fn our_own_tables_read_back() {
-        let names = parse_names(&slicer_colors(3)).expect("a colour table");
-        assert_eq!(names.get(&3).map(String::as_str), Some("branch_2"));
-        assert_eq!(
-            parse_names(&snap_labels(2)).expect("labels").get(&2).map(String::as_str),
-            Some("branch 1")
-        );
-    }
 
     #[test]
     fn near_numbers_have_other_colours() {

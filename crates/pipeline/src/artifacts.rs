@@ -69,11 +69,34 @@ impl Artifacts {
         params: &espalier_volume::Params,
     ) -> Result<espalier_volume::Segmented, Error> {
         let path = self.locate(Artifact::Volume, lookup)?;
-        espalier_volume::read_mask(&path, &self.read_options, params).map_err(|error| match error {
+        let (params, notes) = self.with_label_values(params)?;
+        let made = espalier_volume::read_mask(&path, &self.read_options, &params);
+        let mut segmented = made.map_err(|error| match error {
             // The reader's own message names the file; the others know the volume, not where it came from.
             espalier_volume::Error::Read { .. } => Error::stage(lookup.stage)(Box::new(error)),
             error => Error::file(&path, error),
-        })
+        })?;
+        for note in notes {
+            segmented.report.warn("W-VOLUME-LABEL-NAME", format!("{note} by the names of input.labels"));
+        }
+        Ok(segmented)
+    }
+
+    /// The parameters with values in place of the user's own names of labels, and a sentence for each name.
+    fn with_label_values(
+        &self,
+        params: &espalier_volume::Params,
+    ) -> Result<(espalier_volume::Params, Vec<String>), Error> {
+        let (Some(labels), Some(path)) = (&params.label, self.side_paths.get(&SideFile::InputLabels)) else {
+            return Ok((params.clone(), Vec::new()));
+        };
+        let names = self.label_names(path)?;
+        let (values, notes) = labels.by_names(&names).map_err(|error| Error::file(path, error))?;
+        Ok((espalier_volume::Params { label: Some(values), ..params.clone() }, notes))
+    }
+
+    fn label_names(&self, path: &Path) -> Result<BTreeMap<i64, String>, Error> {
+        label_table::parse_names(&self.read_text(path)?).map_err(|error| Error::file(path, error))
     }
 
     /// The traced tree, with what its reader had to say.
@@ -186,15 +209,20 @@ impl Artifacts {
     /// The label map that branches are labelled by; none if the config names no file of one.
     pub(crate) fn label_map(&self, lookup: Lookup<'_>, reach_mm: f64) -> Result<Option<LabelMap>, Error> {
         let Some(path) = self.side_paths.get(&SideFile::Labels) else { return Ok(None) };
-        // The index of a volume is that of the input.
-        let options = espalier_volume::ReadOptions { volume_index: None, ..self.read_options };
+        // Volume, series, unit and resampling are the input's own. What space a file without one is in is not: both
+        // come from the same program, mostly.
+        let options = espalier_volume::ReadOptions {
+            volume_index: None,
+            unit_mm: None,
+            series: None,
+            resample: false,
+            ..self.read_options
+        };
         let loaded = espalier_volume::read(path, &options)
             .map_err(|error| Error::stage(lookup.stage)(Box::new(error)))?;
+        espalier_volume::check_regions(&loaded.volume).map_err(|error| Error::file(path, error))?;
         let names = match self.side_paths.get(&SideFile::LabelNames) {
-            Some(path) => {
-                let names = label_table::parse_names(&self.read_text(path)?);
-                names.map_err(|error| Error::file(path, error))?
-            }
+            Some(path) => self.label_names(path)?,
             None => BTreeMap::new(),
         };
         Ok(Some(LabelMap { volume: loaded.volume, names, reach_mm }))

@@ -45,6 +45,7 @@ pub use compare::{CompareRequest, Compared, Subject, compare};
 pub use config::{Config, ConfigError, Loaded, Override};
 pub use error::{Error, NotSwept};
 pub use espalier_verify::{Check, Outcome};
+pub use espalier_volume::is_dicom_folder;
 pub use event::Event;
 pub use phantom::make_phantom;
 pub use profile::{WayTo, profile};

@@ -6,6 +6,8 @@ use crate::stage::Stage;
 /// A file beside the input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum SideFile {
+    /// `input.labels`: the names of the input's values.
+    InputLabels,
     /// `tree.labels`: a label map.
     Labels,
     /// `tree.label_names`: the names of its values.
@@ -16,11 +18,12 @@ pub enum SideFile {
 
 impl SideFile {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Labels, Self::LabelNames, Self::Edits];
+    pub const ALL: [Self; 4] = [Self::InputLabels, Self::Labels, Self::LabelNames, Self::Edits];
 
     /// The name in provenance.
     pub(crate) fn role(self) -> &'static str {
         match self {
+            Self::InputLabels => "input_labels",
             Self::Labels => "labels",
             Self::LabelNames => "label_names",
             Self::Edits => "edits",
@@ -31,6 +34,7 @@ impl SideFile {
     #[must_use]
     pub fn key(self) -> &'static str {
         match self {
+            Self::InputLabels => "input.labels",
             Self::Labels => "tree.labels",
             Self::LabelNames => "tree.label_names",
             Self::Edits => "embed.edits",
@@ -40,6 +44,7 @@ impl SideFile {
     /// The stage that reads it.
     pub(crate) fn stage(self) -> Stage {
         match self {
+            Self::InputLabels => Stage::Volume,
             Self::Labels | Self::LabelNames => Stage::Tree,
             Self::Edits => Stage::Embed,
         }
@@ -49,6 +54,7 @@ impl SideFile {
     #[must_use]
     pub fn slot(self, config: &mut Config) -> &mut Option<String> {
         match self {
+            Self::InputLabels => &mut config.input.labels,
             Self::Labels => &mut config.tree.labels,
             Self::LabelNames => &mut config.tree.label_names,
             Self::Edits => &mut config.embed.edits,
@@ -58,6 +64,7 @@ impl SideFile {
     /// Its path as the config has it; none if the config names no such file.
     pub(crate) fn path_in(self, config: &Config) -> Option<&str> {
         let path = match self {
+            Self::InputLabels => &config.input.labels,
             Self::Labels => &config.tree.labels,
             Self::LabelNames => &config.tree.label_names,
             Self::Edits => &config.embed.edits,

@@ -79,6 +79,16 @@ pub enum Error {
         /// The volume's values.
         holds: String,
     },
+    /// A label's name is none of the user's own.
+    #[error("none of the {n_names} names is {name}; the nearest are {nearest}")]
+    NotNamed {
+        /// The name.
+        name: String,
+        /// How many names there are.
+        n_names: usize,
+        /// Those that are nearest.
+        nearest: String,
+    },
     /// A label's name is known, but the volume has no such value, or others that the task has not.
     #[error(
         "the label {name} is {value} in TotalSegmentator's task {task}, but the volume is none of it: it holds {holds}"
@@ -92,6 +102,16 @@ pub enum Error {
         task: &'static str,
         /// The volume's values.
         holds: String,
+    },
+    /// A map of regions that holds no labels.
+    #[error("this is no label map: it holds {}, from {min} to {max}", if *.n_values > 0 { format!("{n_values} different values or more") } else { "values that are not whole".to_owned() })]
+    NotRegions {
+        /// How many different values there are at least; 0 where some are not whole.
+        n_values: usize,
+        /// The smallest finite value.
+        min: f64,
+        /// The largest finite value.
+        max: f64,
     },
     /// A label by name, of a volume that is no label map.
     #[error("the volume is no label map: it holds values from {min} to {max}, none of which can be {label}")]
@@ -155,9 +175,9 @@ impl Diagnose for Error {
             Self::Empty { .. } => "E-VOLUME-EMPTY",
             Self::SeedOutside { .. } => "E-VOLUME-SEED-OUTSIDE",
             Self::SeedOutOfBand { .. } => "E-VOLUME-SEED-BAND",
-            Self::UnknownLabel { .. } => "E-VOLUME-LABEL-UNKNOWN",
+            Self::UnknownLabel { .. } | Self::NotNamed { .. } => "E-VOLUME-LABEL-UNKNOWN",
             Self::AbsentLabel { .. } => "E-VOLUME-LABEL-ABSENT",
-            Self::NoLabelMap { .. } => "E-VOLUME-NO-LABELS",
+            Self::NoLabelMap { .. } | Self::NotRegions { .. } => "E-VOLUME-NO-LABELS",
             Self::NoTrachea { .. } => "E-VOLUME-NO-TRACHEA",
             Self::NoKnee { .. } => "E-VOLUME-NO-KNEE",
             Self::Closing { .. } => "E-VOLUME-CLOSING",
@@ -172,12 +192,13 @@ impl Diagnose for Error {
             Self::Param(error) => error.class(),
             Self::MethodNeeded { .. }
             | Self::UnknownLabel { .. }
+            | Self::NotNamed { .. }
             | Self::SeedOutside { .. }
             | Self::SeedOutOfBand { .. }
             | Self::Closing { .. }
             | Self::Grid(_) => Class::Usage,
             Self::TooLarge { .. } => Class::Limit,
-            Self::AbsentLabel { .. } | Self::NoLabelMap { .. } => Class::Input,
+            Self::AbsentLabel { .. } | Self::NoLabelMap { .. } | Self::NotRegions { .. } => Class::Input,
             Self::Empty { .. } | Self::NoTrachea { .. } | Self::NoKnee { .. } => Class::Input,
         }
     }
@@ -192,9 +213,14 @@ impl Diagnose for Error {
                 "voxels count from 0 on the file's own axes; points are RAS+ mm".to_owned()
             }
             Self::UnknownLabel { .. } | Self::AbsentLabel { .. } => {
-                "set volume.label to one of the values, which always works".to_owned()
+                "set volume.label to one of the values, which always works, or input.labels to a file with your names"
+                    .to_owned()
             }
+            Self::NotNamed { .. } => "set volume.label to one of these names, or to a value".to_owned(),
             Self::NoLabelMap { .. } => "set volume.preset or volume.method for a scan".to_owned(),
+            Self::NotRegions { .. } => {
+                "give a label map: whole numbers, one for each region, 0 outside of all".to_owned()
+            }
             Self::NoTrachea { min, .. } if *min > -500.0 => {
                 "nothing is as dark as air: the values are no HU (the intercept of the scan may be missing), or the scan \
                  shows no lung; set volume.seed_voxel and volume.upper"

@@ -4,12 +4,18 @@
 //! **Steps** one pass that keeps the distinct values as long as they are few.
 //! **Cost** O(voxels · log distinct values) time, constant memory.
 
+use std::collections::BTreeSet;
+
 use espalier_model::Volume;
+
+use crate::Error;
 
 /// More distinct values than this, and a volume of whole numbers is no label map.
 const MAX_LABELS: usize = 512;
 /// The largest number that is still taken for a label.
 const MAX_LABEL: f64 = 65_535.0;
+/// Of a map of regions: the finest atlases have some hundred, a scan has thousands of values.
+const MAX_REGIONS: usize = 1024;
 
 /// What a volume is by its values.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,6 +61,31 @@ pub fn inspect_kind(volume: &Volume) -> Kind {
     let mut census = Census::default();
     volume.for_each_value(|value| census.see(value));
     census.kind()
+}
+
+/// Checks that a volume may be a map of regions: whole numbers of any size and sign, at most 1024 different ones. Wider
+/// than [`Kind::Labels`], since here it is known what the volume is meant to be.
+///
+/// # Errors
+/// [`Error::NotRegions`] for anything else, such as a scan.
+pub fn check_regions(volume: &Volume) -> Result<(), Error> {
+    let mut distinct: BTreeSet<i64> = BTreeSet::new();
+    let (mut is_whole, mut last) = (true, f64::NAN);
+    let (mut min, mut max) = (f64::INFINITY, f64::NEG_INFINITY);
+    volume.for_each_value(|value| {
+        if value == last || !value.is_finite() {
+            return;
+        }
+        last = value;
+        (min, max) = (min.min(value), max.max(value));
+        is_whole &= value.trunc() == value;
+        if distinct.len() <= MAX_REGIONS {
+            distinct.insert(value as i64);
+        }
+    });
+    let n_values = if is_whole { distinct.len() } else { 0 };
+    let is_map = is_whole && n_values <= MAX_REGIONS;
+    if is_map { Ok(()) } else { Err(Error::NotRegions { n_values, min, max }) }
 }
 
 /// The values of a volume as far as its kind depends on them.

@@ -8,6 +8,9 @@
 //! **Source** the class names and numbers of TotalSegmentator version 2.
 //! **Cost** constant.
 
+mod classes;
+
+use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::de::{self, SeqAccess, Visitor};
@@ -15,139 +18,7 @@ use serde::ser::SerializeSeq;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::Error;
-
-/// The classes of the task `total` of TotalSegmentator 2, from 1 on.
-const TOTAL: [&str; 117] = [
-    "spleen",
-    "kidney_right",
-    "kidney_left",
-    "gallbladder",
-    "liver",
-    "stomach",
-    "pancreas",
-    "adrenal_gland_right",
-    "adrenal_gland_left",
-    "lung_upper_lobe_left",
-    "lung_lower_lobe_left",
-    "lung_upper_lobe_right",
-    "lung_middle_lobe_right",
-    "lung_lower_lobe_right",
-    "esophagus",
-    "trachea",
-    "thyroid_gland",
-    "small_bowel",
-    "duodenum",
-    "colon",
-    "urinary_bladder",
-    "prostate",
-    "kidney_cyst_left",
-    "kidney_cyst_right",
-    "sacrum",
-    "vertebrae_S1",
-    "vertebrae_L5",
-    "vertebrae_L4",
-    "vertebrae_L3",
-    "vertebrae_L2",
-    "vertebrae_L1",
-    "vertebrae_T12",
-    "vertebrae_T11",
-    "vertebrae_T10",
-    "vertebrae_T9",
-    "vertebrae_T8",
-    "vertebrae_T7",
-    "vertebrae_T6",
-    "vertebrae_T5",
-    "vertebrae_T4",
-    "vertebrae_T3",
-    "vertebrae_T2",
-    "vertebrae_T1",
-    "vertebrae_C7",
-    "vertebrae_C6",
-    "vertebrae_C5",
-    "vertebrae_C4",
-    "vertebrae_C3",
-    "vertebrae_C2",
-    "vertebrae_C1",
-    "heart",
-    "aorta",
-    "pulmonary_vein",
-    "brachiocephalic_trunk",
-    "subclavian_artery_right",
-    "subclavian_artery_left",
-    "common_carotid_artery_right",
-    "common_carotid_artery_left",
-    "brachiocephalic_vein_left",
-    "brachiocephalic_vein_right",
-    "atrial_appendage_left",
-    "superior_vena_cava",
-    "inferior_vena_cava",
-    "portal_vein_and_splenic_vein",
-    "iliac_artery_left",
-    "iliac_artery_right",
-    "iliac_vena_left",
-    "iliac_vena_right",
-    "humerus_left",
-    "humerus_right",
-    "scapula_left",
-    "scapula_right",
-    "clavicula_left",
-    "clavicula_right",
-    "femur_left",
-    "femur_right",
-    "hip_left",
-    "hip_right",
-    "spinal_cord",
-    "gluteus_maximus_left",
-    "gluteus_maximus_right",
-    "gluteus_medius_left",
-    "gluteus_medius_right",
-    "gluteus_minimus_left",
-    "gluteus_minimus_right",
-    "autochthon_left",
-    "autochthon_right",
-    "iliopsoas_left",
-    "iliopsoas_right",
-    "brain",
-    "skull",
-    "rib_left_1",
-    "rib_left_2",
-    "rib_left_3",
-    "rib_left_4",
-    "rib_left_5",
-    "rib_left_6",
-    "rib_left_7",
-    "rib_left_8",
-    "rib_left_9",
-    "rib_left_10",
-    "rib_left_11",
-    "rib_left_12",
-    "rib_right_1",
-    "rib_right_2",
-    "rib_right_3",
-    "rib_right_4",
-    "rib_right_5",
-    "rib_right_6",
-    "rib_right_7",
-    "rib_right_8",
-    "rib_right_9",
-    "rib_right_10",
-    "rib_right_11",
-    "rib_right_12",
-    "sternum",
-    "costal_cartilages",
-];
-
-/// The classes of the task `lung_vessels`, from 1 on.
-const LUNG_VESSELS: [&str; 2] = ["lung_vessels", "lung_trachea_bronchia"];
-
-/// Other words for classes.
-const SYNONYMS: [(&str, &str); 3] = [
-    ("airway", "lung_trachea_bronchia"),
-    ("airways", "lung_trachea_bronchia"),
-    ("bronchi", "lung_trachea_bronchia"),
-];
-
-const TASKS: [(&str, &[&str]); 2] = [("total", &TOTAL), ("lung_vessels", &LUNG_VESSELS)];
+use classes::{LUNG_VESSELS, SYNONYMS, TASKS};
 
 /// How many names or values a message lists.
 const N_LISTED: usize = 12;
@@ -188,6 +59,32 @@ impl Labels {
             Label::Name(name) => !name.is_empty(),
         };
         !self.0.is_empty() && self.0.iter().all(is_legal)
+    }
+
+    /// The labels with a value in place of each name, by names that the user gave; and a sentence for each name. A name
+    /// is looked for as it is written, then with capitals, spaces, hyphens and underscores all one; where several values
+    /// have it, it stands for all of them.
+    ///
+    /// # Errors
+    /// [`Error::NotNamed`] for a name that is not among them, with those that are nearest.
+    pub fn by_names(&self, names: &BTreeMap<i64, String>) -> Result<(Self, Vec<String>), Error> {
+        let (mut labels, mut notes) = (Vec::new(), Vec::new());
+        for label in &self.0 {
+            let Label::Name(name) = label else {
+                labels.push(label.clone());
+                continue;
+            };
+            let values = values_of(name, names);
+            if values.is_empty() {
+                let mut known: Vec<&str> = names.values().map(String::as_str).collect();
+                known.dedup();
+                let nearest = listed(nearest_of(name, known.into_iter()).into_iter());
+                return Err(Error::NotNamed { name: name.clone(), n_names: names.len(), nearest });
+            }
+            notes.push(format!("label {name} taken for {}", listed(values.iter().map(i64::to_string))));
+            labels.extend(values.into_iter().map(|value| Label::Value(value as f64)));
+        }
+        Ok((Self(labels), notes))
     }
 
     /// The values, if none is given by name.
@@ -256,17 +153,38 @@ fn named(value: f64, present: &[f64]) -> String {
     name.map_or_else(|| value.to_string(), |name| format!("{value} ({name})"))
 }
 
+/// The values that have a name.
+fn values_of(name: &str, names: &BTreeMap<i64, String>) -> Vec<i64> {
+    let of = |is_same: &dyn Fn(&str) -> bool| -> Vec<i64> {
+        names.iter().filter(|(_, known)| is_same(known)).map(|(&value, _)| value).collect()
+    };
+    let exact = of(&|known| known == name);
+    if exact.is_empty() { of(&|known| folded(known) == folded(name)) } else { exact }
+}
+
+/// A name with its words in lower case, parted by single spaces.
+fn folded(name: &str) -> String {
+    let is_gap = |letter: char| letter.is_whitespace() || letter == '_' || letter == '-';
+    let words: Vec<&str> = name.split(is_gap).filter(|word| !word.is_empty()).collect();
+    words.join(" ").to_lowercase()
+}
+
 /// The three names that are nearest.
 fn nearest(name: &str) -> Vec<String> {
     let names = TASKS.iter().flat_map(|(_, classes)| classes.iter().copied());
     let synonyms = SYNONYMS.iter().map(|(word, _)| *word);
-    let mut ranked: Vec<(usize, &str)> = names
-        .chain(synonyms)
-        .map(|other| (strsim::damerau_levenshtein(name, &other.to_lowercase()), other))
-        .collect();
+    nearest_of(name, names.chain(synonyms))
+}
+
+/// The three of some names that are nearest.
+fn nearest_of<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let name = &name.to_lowercase();
+    let mut ranked: Vec<(usize, &str)> =
+        names.map(|other| (strsim::damerau_levenshtein(name, &other.to_lowercase()), other)).collect();
     // Names that hold the word, or are held by it, come first.
-    ranked
-        .sort_by_key(|&(distance, other)| (!(other.contains(name) || name.contains(other)), distance, other));
+    ranked.sort_by_key(|&(distance, other)| {
+        (!(other.contains(name.as_str()) || name.contains(other)), distance, other)
+    });
     ranked.iter().take(3).map(|(_, other)| (*other).to_owned()).collect()
 }
 
@@ -341,6 +259,7 @@ impl<'de> Visitor<'de> for LabelsVisitor {
 
 #[cfg(test)]
 mod tests {
+    use super::classes::TOTAL;
     use super::*;
 
     fn value_of(name: &str, present: &[f64]) -> Result<f64, String> {
@@ -370,6 +289,23 @@ mod tests {
         assert!(error.contains("16 (trachea)"), "{error}");
         assert_eq!(nearest("trachae")[0], "trachea");
         assert_eq!(nearest("iliac_vena")[..2], ["iliac_vena_left", "iliac_vena_right"]);
+    }
+
+    #[test]
+    fn names_of_the_users_own() {
+        let names = ["left lung", "right_lung", "Left Lung", "Aorta"];
+        let names: BTreeMap<i64, String> = (10..).zip(names.map(str::to_owned)).collect();
+        let values = |text: &str| Labels::parse(text).by_names(&names).map(|(labels, _)| labels.values());
+        assert_eq!(values("left lung").expect("exact"), Some(vec![10.0]));
+        assert_eq!(values("LEFT-LUNG").expect("folded"), Some(vec![10.0, 12.0]));
+        assert_eq!(values("right lung, 7, aorta").expect("three"), Some(vec![11.0, 7.0, 13.0]));
+        let error = values("rigth lung").expect_err("unknown").to_string();
+        assert!(
+            error.contains("none of the 4 names is rigth lung") && error.contains("right_lung"),
+            "{error}"
+        );
+        // Of a file of the user's own, no other names count.
+        assert!(values("trachea").is_err());
     }
 
     #[test]

@@ -13,7 +13,7 @@
 //! | **[`read`]**: file → [`Volume`](espalier_model::Volume) | `read` |
 //! | what a volume is: mask, labels, CT | `kind` |
 //! | mask, label, threshold band | `select`, `choose` |
-//! | labels by name | `labels` |
+//! | labels by name | `labels`, `labels/classes` |
 //! | region growing from a seed | `region_grow` |
 //! | where a region leaks | `growth` |
 //! | where the trachea is | `trachea` |
@@ -76,11 +76,11 @@ mod error;
 mod params;
 mod read_error;
 
-pub use dicom::{DicomError, Irregularity, Listed, Obstacle};
+pub use dicom::{DicomError, Irregularity, Listed, Obstacle, is_dicom_folder};
 pub use error::Error;
 pub use euler::euler_number;
 pub use growth::{GROWTH_COLUMNS, Growth, Knee, Level, Towards};
-pub use kind::{Kind, inspect_kind};
+pub use kind::{Kind, check_regions, inspect_kind};
 pub use labels::{Label, Labels};
 pub use params::{AssumedSpace, Components, Method, Params, Preset, ReadOptions, Spacing};
 pub use read::{Loaded, files, read};

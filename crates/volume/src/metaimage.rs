@@ -44,10 +44,12 @@ pub(crate) fn open(
     let (slope, intercept) = scaling(&keys, report)?;
     let world_from_voxel = world_from_voxel(&keys, sizes.len(), options, report)?;
     let layout = Layout::of(&keys, &sizes, scalar, n_volumes)?;
-    let stream = layout.stream(data(source, path, &keys, &layout)?, index)?;
+    let data = data(source, path, &keys, &layout)?;
+    let files = data.files(path);
+    let stream = layout.stream(data, index)?;
     let form = "TransformMatrix and ElementSpacing";
     let is_big_endian = layout.is_binary && is_big_endian(&keys)?;
-    Ok(Stored { shape, world_from_voxel, form, scalar, is_big_endian, slope, intercept, stream })
+    Ok(Stored { shape, world_from_voxel, form, scalar, is_big_endian, slope, intercept, files, stream })
 }
 
 /// The header's values by key.

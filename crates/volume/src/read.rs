@@ -27,14 +27,15 @@ pub struct Loaded {
     pub report: Report,
 }
 
-/// The files that [`read`] takes a volume from: the file itself, or those of a DICOM series by position.
+/// The files that [`read`] takes a volume from: the file itself; header and data where they are two files; those of a
+/// DICOM series by position.
 ///
 /// # Errors
 /// As [`read`], as far as headers tell.
 pub fn files(path: &Path, options: &ReadOptions) -> Result<Vec<PathBuf>, Error> {
     let listed = |path: &Path| match dicom::is_dicom(path)? {
         true => dicom::files(path, options),
-        false => Ok(vec![path.to_owned()]),
+        false => Ok(Stored::open(path, options, &mut Report::default())?.files),
     };
     listed(path).map_err(|problem| Error::Read { problem, path: path.to_owned() })
 }

@@ -262,11 +262,11 @@ impl Diagnose for ReadError {
             Self::Detached { problem, .. } => return problem.hint(),
             Self::Field { .. } => "write the file again with a program that checks its headers",
             Self::NotScalar { .. } => "convert the volume to one number a voxel",
-            Self::FourDimensional { .. } => "choose one, counted from 0: `--set input.volume_index=0`, or `volume_index = 0` under [input]",
-            Self::VolumeIndex { .. } => "choose another: `--set input.volume_index=0`, or `volume_index = 0` under [input]",
-            Self::NoSpace { .. } => "say which: `--set input.assume_space=ras`, or las or lps, or `assume_space` under [input]",
+            Self::FourDimensional { .. } => "choose one, counted from 0: `--volume-index 0`, or `volume_index = 0` under [input]",
+            Self::VolumeIndex { .. } => "choose another: `--volume-index 0`, or `volume_index = 0` under [input]",
+            Self::NoSpace { .. } => "say which: `--assume-space ras`, or las or lps, or `assume_space` under [input]",
             Self::Grid { problem: GridError::Sheared { .. }, .. } => {
-                "with `--set input.strict=false`, the default, the volume is resampled to orthogonal axes"
+                "without `--strict`, and `strict = true` under [input], the volume is resampled to orthogonal axes"
             }
             Self::Form { .. } | Self::Grid { .. } => {
                 "set sform or qform right in the program that made the file"

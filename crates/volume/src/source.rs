@@ -163,6 +163,11 @@ impl Source {
         self.detached.is_some()
     }
 
+    /// The files of a volume whose header is at `header` and whose voxels this stream has.
+    pub(crate) fn files(&self, header: &Path) -> Vec<PathBuf> {
+        std::iter::once(header.to_owned()).chain(self.detached.clone()).collect()
+    }
+
     /// The most bytes that the stream can have in all; exact where it is not compressed.
     pub(crate) fn max_bytes(&self) -> u64 {
         self.max_bytes

@@ -9,7 +9,7 @@
 //! A format is a function that makes a [`Stored`] of a file whose first bytes say that it has this format, and a
 //! [`VoxelStream`].
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use espalier_model::Report;
 use glam::DAffine3;
@@ -41,6 +41,8 @@ pub(crate) struct Stored {
     pub(crate) slope: f64,
     /// See `slope`.
     pub(crate) intercept: f64,
+    /// The files that it is made of, the header first.
+    pub(crate) files: Vec<PathBuf>,
     /// The voxels' bytes, x fastest, z slowest.
     pub(crate) stream: Box<dyn VoxelStream>,
 }

@@ -123,7 +123,7 @@ fn the_ladder() {
     // Neither: an error, or what the caller assumes.
     assert_eq!(Made::new().outcome(&options), error("E-VOLUME-NO-SPACE"));
     let hint = Made::new().read(&options).expect_err("no space").hint();
-    assert!(hint.contains("--set input.assume_space=ras"), "{hint}");
+    assert!(hint.contains("--assume-space ras"), "{hint}");
     for (space, letters) in
         [(AssumedSpace::Ras, "RAS"), (AssumedSpace::Las, "LAS"), (AssumedSpace::Lps, "LPS")]
     {
@@ -206,10 +206,7 @@ fn four_dimensions() {
     made.sform(SFORM).i16(40, &[4, 3, 4, 1, 5]);
     let with = |volume_index| ReadOptions { volume_index, ..ReadOptions::default() };
     let error = made.read(&with(None)).expect_err("which one?");
-    assert!(
-        error.to_string().contains("5 volumes") && error.hint().contains("--set input.volume_index=0"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("5 volumes") && error.hint().contains("--volume-index 0"), "{error}");
     let third = made.read(&with(Some(3))).expect("the third").volume;
     assert_eq!((third.value(0), third.value(11)), (36.0, 47.0));
     let error = made.read(&with(Some(5))).expect_err("there are five");
@@ -225,7 +222,7 @@ fn shear_is_resampled_or_refused() {
     let strict = ReadOptions { strict: true, ..ReadOptions::default() };
     assert_eq!(made.outcome(&strict).1, "E-VOLUME-SHEAR");
     let hint = made.read(&strict).expect_err("sheared").hint();
-    assert!(hint.contains("--set input.strict=false"), "{hint}");
+    assert!(hint.contains("without `--strict`"), "{hint}");
     let loaded = made.read(&ReadOptions::default()).expect("resampled");
     let grid = loaded.volume.grid().clone();
     let cosines = grid.world_from_voxel().matrix3;

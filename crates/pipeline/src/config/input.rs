@@ -70,11 +70,17 @@ pub struct Input {
     /// Which DICOM series of a folder, from 1 as the message lists them. Default: the only one that can be a volume.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub series: Option<usize>,
+    /// A file with the names of a label map's values, so that `volume.label` can be one of them: a label description of
+    /// ITK-SNAP, a colour table of 3D Slicer (`.ctbl`, `.csv`), `dseg.tsv` of BIDS, JSON as of TotalSegmentator, or lines
+    /// `1 left lung`. Relative to the config's folder. Default: none; the names are TotalSegmentator's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub labels: Option<String>,
     /// Resample DICOM slices of a tilted gantry, with gaps or at uneven distances to an even orthogonal grid. Default
     /// false: they are refused with the reason.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub resample: bool,
-    /// The space of a volume or of polylines whose file does not name it.
+    /// The space of a volume or of polylines whose file does not name it; that of `tree.labels` too, if its file names
+    /// none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub assume_space: Option<espalier_volume::AssumedSpace>,
     /// Refuse what would otherwise be repaired with a warning. Default false.
@@ -96,6 +102,7 @@ impl Default for Input {
             kind: InputKind::Auto,
             volume_index: None,
             series: None,
+            labels: None,
             resample: false,
             assume_space: None,
             strict: false,

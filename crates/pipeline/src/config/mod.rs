@@ -1,7 +1,7 @@
 //! The config: one TOML file is the whole run.
 //!
 //! **Steps** 1. Parse the text; an unknown key or a wrong type is an error at its line. 2. Lay `--set key=value`
-//! overrides over it. 3. Validate every stage's parameters; a value out of range is an error at its line.
+//! overrides over it; a preset settles what neither says. 3. Validate every stage's parameters; a value out of range is an error at its line.
 //! 4. [`Config::to_toml`] writes the resolved copy, every key with its value.
 
 mod input;
@@ -140,9 +140,20 @@ impl Config {
         let source = place::SourceText { text, path, overrides };
         // The file alone comes first: only there do errors have a place.
         let alone: Self = toml::from_str(text).map_err(|error| source.parse_error(&error))?;
-        let config = if overrides.is_empty() { alone } else { source.overridden()? };
+        let mut config = if overrides.is_empty() { alone } else { source.overridden()? };
+        config.settle_root(&source);
         config.validate(&source)?;
         Ok(config)
+    }
+
+    /// The one place where a preset reaches beyond its stage: airways hang from the trachea, which is not always their
+    /// thickest tip, so `volume.preset = "airway"` makes `tree.root` `"superior"` where neither file nor command line
+    /// says what it is.
+    fn settle_root(&mut self, source: &place::SourceText<'_>) {
+        let is_airway = self.volume.preset == Some(espalier_volume::Preset::Airway);
+        if is_airway && !source.sets("tree.root") {
+            self.tree.root = espalier_tree::Root::Superior;
+        }
     }
 
     /// The config of a run that is given only its input, under `overrides`.

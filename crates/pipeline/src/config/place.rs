@@ -56,6 +56,15 @@ impl SourceText<'_> {
         Config::deserialize_table(&table).map_err(|error| self.parse_error(&error))
     }
 
+    /// Whether the text or the command line has a value at a dotted key.
+    pub(super) fn sets(&self, dotted: &str) -> bool {
+        let mut value = toml::from_str::<Table>(self.text).ok().map(Value::Table);
+        for name in dotted.split('.') {
+            value = value.and_then(|value| value.get(name).cloned());
+        }
+        value.is_some() || self.overrides.iter().any(|set| covers(&set.key, dotted))
+    }
+
     fn at(&self, span: Option<Range<usize>>, title: &str, hint: String) -> Box<ConfigError> {
         let path = self.path.display().to_string();
         let Some(span) = span.filter(|span| span.end <= self.text.len()) else {

@@ -44,6 +44,13 @@ pub(crate) fn is_dicom(path: &Path) -> Result<bool, ReadError> {
     Ok(metadata.is_dir() || (metadata.is_file() && header::is_dicom(path)?))
 }
 
+/// Whether a path is a folder with a file of DICOM in it, or in a folder below.
+#[must_use]
+pub fn is_dicom_folder(path: &Path) -> bool {
+    let files = if path.is_dir() { series::list_files(path, true) } else { Ok(Vec::new()) };
+    files.is_ok_and(|files| files.iter().any(|file| header::is_dicom(file).unwrap_or(false)))
+}
+
 /// Reads the series that `path` means.
 pub(crate) fn read(path: &Path, options: &ReadOptions, report: &mut Report) -> Result<Assembled, ReadError> {
     let (stack, modality) = stack(path, options, report)?;

@@ -105,7 +105,7 @@ pub(super) fn own_name(path: &Path) -> String {
 }
 
 /// The files of a folder, and of the folders in it if `is_deep`, by name.
-fn list_files(folder: &Path, is_deep: bool) -> Result<Vec<PathBuf>, ReadError> {
+pub(super) fn list_files(folder: &Path, is_deep: bool) -> Result<Vec<PathBuf>, ReadError> {
     let (mut files, mut folders) = (Vec::new(), vec![folder.to_owned()]);
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(&folder)? {

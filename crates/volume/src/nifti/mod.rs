@@ -52,6 +52,7 @@ pub(crate) fn open(
         is_big_endian: fields.is_big_endian,
         slope: header.slope,
         intercept: header.intercept,
+        files: if fields.is_pair { source.files(path) } else { vec![path.to_owned()] },
         stream: Box::new(NiftiStream { source, n_after, offset: header.offset, has_hidden_extension }),
     })
 }

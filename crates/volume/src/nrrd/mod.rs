@@ -41,6 +41,7 @@ pub(crate) fn open(
         is_big_endian: header.is_big_endian,
         slope: 1.0,
         intercept: 0.0,
+        files: data.files(path),
         stream: stream(data, &header, &axes, index)?,
     })
 }
