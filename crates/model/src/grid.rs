@@ -15,6 +15,9 @@ pub struct Grid {
     world_from_voxel: DAffine3,
 }
 
+/// What coordinates of LPS, the space of DICOM, ITK and VTK, are multiplied by to be RAS, and the other way round.
+pub const RAS_FROM_LPS: DVec3 = DVec3::new(-1.0, -1.0, 1.0);
+
 /// Why a grid cannot be.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]

@@ -23,6 +23,7 @@
 
 pub mod anatomy;
 mod bits;
+pub mod bytes;
 pub mod diagnose;
 mod digest;
 mod edits;
@@ -44,7 +45,7 @@ mod versioned;
 mod views;
 mod volume;
 pub mod vtp_out;
-mod xml;
+pub mod xml;
 
 pub use anatomy::{Anatomy, BranchMeasures, Region};
 pub use bits::Bits;
@@ -55,7 +56,7 @@ pub use embedding::{
     EditRecord, Embedding, Energy, LossColumn, Losses, MethodRow, NODE_COLUMNS, Pose, RUN_COLUMN, TargetKind,
     Targets, Termination, TracePoint, WidthMode, Widths, compare_columns,
 };
-pub use grid::{Grid, GridError};
+pub use grid::{Grid, GridError, RAS_FROM_LPS};
 pub use ledger::{LEDGER_COLUMNS, Ledger, LedgerEntry, LedgerKind};
 pub use mask::Mask;
 pub use report::{Count, Report, Warning};

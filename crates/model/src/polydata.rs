@@ -22,8 +22,8 @@ use glam::DVec3;
 
 pub use error::PolydataError;
 
-use crate::Report;
 use crate::swc::SwcScale;
+use crate::{RAS_FROM_LPS, Report};
 
 /// The names of radius arrays, best first: VMTK's, ours, and what others write.
 const RADIUS_NAMES: [&str; 4] = ["MaximumInscribedSphereRadius", "radius_mm", "Radius", "radius"];
@@ -105,7 +105,7 @@ pub fn parse(
     }
     let signs = match dataset.space.as_deref() {
         Some("RAS") => DVec3::ONE,
-        Some("LPS") => DVec3::new(-1.0, -1.0, 1.0),
+        Some("LPS") => RAS_FROM_LPS,
         _ => assumed.ok_or(PolydataError::NoSpace)?,
     };
     let points_mm = points(&dataset, scale.position_mm * signs)?;

@@ -14,9 +14,10 @@ use std::fmt::Write as _;
 
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
+use glam::DVec3;
 
 use crate::anatomy::{MeasureValue, branch_measures};
-use crate::{Anatomy, Tree};
+use crate::{Anatomy, RAS_FROM_LPS, Tree};
 
 /// The text of `tree.vtp`.
 #[must_use]
@@ -86,9 +87,8 @@ fn cell_data(anatomy: &Anatomy) -> String {
 
 fn points(tree: &Tree) -> String {
     let lps = tree.nodes().iter().flat_map(|node| {
-        let [x, y, z] = node.position_mm.to_array();
-        // 0 has one sign only.
-        [0.0 - x, 0.0 - y, z]
+        // Adding 0 leaves it one sign only.
+        (node.position_mm * RAS_FROM_LPS + DVec3::ZERO).to_array()
     });
     let bytes = encoded(lps.flat_map(f64::to_le_bytes));
     format!(
@@ -132,7 +132,6 @@ fn array(scalar: &str, name: &str, encoded: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
 
     use super::*;
     use crate::Node;

@@ -1,7 +1,8 @@
 //! Text inside of XML.
 
 /// A text with what XML gives a meaning to, or forbids, replaced: as character data or inside of double quotes.
-pub(crate) fn escape(text: &str) -> String {
+#[must_use]
+pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for letter in text.chars() {
         match letter {

@@ -21,8 +21,8 @@ use crate::simple::{is_endpoint, n_neighbors};
 
 /// Sweeps take one to three voxels of a tip; the rest is for swaps along a staircase.
 const MAX_VOXELS: usize = 8;
-/// How much less deep than the tip the voxels beyond it may be, in spacings: of 1787 tubes of even and odd width,
-/// seven end up to 0.9 voxel short with 0.7, none with 1.0 or 1.3; a spur loses a whole spacing a voxel.
+/// How much less deep than the tip the voxels beyond it may be, in spacings: with less, tubes of some widths end short;
+/// a spur loses a whole spacing a voxel.
 const LEEWAY: f64 = 1.0;
 /// How much further along its heading a swap must bring a tip, in spacings.
 const LEAST_GAIN: f64 = 0.3;

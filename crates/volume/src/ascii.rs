@@ -2,7 +2,8 @@
 //!
 //! **Input** a stream of numbers parted by white space. **Output** a stream of their bytes, little-endian.
 //! **Steps** 1. one word after the other; 2. each as a whole number, or for floats as a decimal one.
-//! **Guarantees** a word is at most 64 letters; a number that the type cannot hold is an error with its place.
+//! **Guarantees** a word is at most 64 letters; a number that the type cannot hold is an error with its place; the
+//! checksum of compressed text is verified.
 
 use std::io::Write as _;
 
@@ -11,7 +12,7 @@ use espalier_model::Report;
 use crate::ReadError;
 use crate::scalar::Scalar;
 use crate::source::Source;
-use crate::stored::VoxelStream;
+use crate::stored::{MAX_TRAILING_BYTES, VoxelStream};
 
 /// No number that a program writes is longer.
 const MAX_WORD_BYTES: usize = 64;
@@ -20,7 +21,8 @@ const MAX_WORD_BYTES: usize = 64;
 pub(crate) struct AsciiStream {
     source: Source,
     scalar: Scalar,
-    /// How many numbers have come.
+    /// How many numbers there should be, and how many have come.
+    n_declared: u64,
     n_numbers: u64,
     /// Bytes of a number that did not fit the buffer.
     left: Vec<u8>,
@@ -32,7 +34,7 @@ impl AsciiStream {
         // Each number but the last has at least one digit and one space.
         let shortest = source.position().saturating_add(n_numbers.saturating_mul(2) - 1);
         source.expect(shortest)?;
-        Ok(Self { source, scalar, n_numbers: 0, left: Vec::new() })
+        Ok(Self { source, scalar, n_declared: n_numbers, n_numbers: 0, left: Vec::new() })
     }
 
     /// Passes over so many numbers.
@@ -99,8 +101,14 @@ impl VoxelStream for AsciiStream {
         Ok(())
     }
 
-    /// What follows the numbers is not looked at: text has no checksum, and further volumes may follow.
+    /// What follows the numbers is not looked at, for further volumes may; compressed text is read to its end, so that
+    /// its checksum is verified.
     fn finish(&mut self, _report: &mut Report) -> Result<(), ReadError> {
+        if self.source.is_compressed() {
+            let n_left = self.n_declared.saturating_sub(self.n_numbers);
+            let longest = n_left.saturating_mul(MAX_WORD_BYTES as u64 + 1);
+            self.source.drain(longest.saturating_add(MAX_TRAILING_BYTES))?;
+        }
         Ok(())
     }
 }

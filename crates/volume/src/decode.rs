@@ -20,11 +20,8 @@ use crate::stored::Stored;
 macro_rules! number {
     ($stored:expr, $file_type:ty) => {{
         let is_big_endian = $stored.is_big_endian;
-        move |mut bytes: [u8; size_of::<$file_type>()]| {
-            if is_big_endian {
-                bytes.reverse();
-            }
-            <$file_type>::from_le_bytes(bytes)
+        move |bytes: [u8; size_of::<$file_type>()]| {
+            <$file_type>::from_le_bytes(espalier_model::bytes::from_lowest(bytes, is_big_endian))
         }
     }};
 }

@@ -109,6 +109,12 @@ impl Growth {
         }
     }
 
+    /// Whether the region is too small for a leak to be told from noise.
+    #[must_use]
+    pub fn is_small(&self) -> bool {
+        self.levels.last().is_none_or(|level| level.n_voxels < MIN_VOXELS)
+    }
+
     /// The volume of a level in ml.
     #[must_use]
     pub fn ml(&self, level: Level) -> f64 {
@@ -161,8 +167,7 @@ pub(crate) fn measure(volume: &Volume, seed: [usize; 3], towards: Towards, limit
             growth.knee = if is_leak { Knee::Leak { stable } } else { growth.knee };
         }
     }
-    let is_small = flood.n_reached < MIN_VOXELS;
-    if growth.knee == Knee::NeverCalm && (is_small || last_calm.is_some()) {
+    if growth.knee == Knee::NeverCalm && (growth.is_small() || last_calm.is_some()) {
         growth.knee = Knee::None;
     }
     growth

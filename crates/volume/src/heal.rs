@@ -7,47 +7,26 @@
 //! **Steps** 1. blur M by a Gaussian of σ = 0.7 voxel and cut at 0.45, at the voxels next to the surface: no other
 //! can change. 2. Where the cut takes away more than a voxel's depth, or a piece that is all that joins two others,
 //! it stands for a thin branch: put it back. 3. Of the patches take those that raise χ; at one voxel from each other
-//! they cannot meet in a 2×2×2 block, so their effects add up. 4. Take back any that cut a component in two.
-//! **Why not S itself?** Ends of thin branches vanish in it: 27 of 49 on the airway of the pulmonary CT at hand. By
-//! patches none did, on no mask at hand, and as many tunnels closed: 184 → 6 on a phantom with 15 % of its surface
-//! voxels flipped (tips found 87 → 98 %), 11 → 5 of a bronchial tree, with 154 and 6 patches of 4770 and 271.
-//! **Guarantees** no component is cut; a mask without tunnels stays as it is; the result does not depend on the number
-//! of threads. Components a voxel apart may be joined where the bridge closes a tunnel: of one component kept, the
-//! usual case, there is no other to join.
+//! they cannot meet in a 2×2×2 block, so their effects add up. 4. Leave out any that touch two components, and take back
+//! any that cut one in two.
+//! **Why not S itself?** Ends of thin branches vanish in it. A patch that changes no tunnel is left out, so they stay, and
+//! as many tunnels close.
+//! **Guarantees** no component is cut, and none joined with another; a mask without tunnels stays as it is; the result
+//! does not depend on the number of threads.
 //! **Differs from the source** the blur and its threshold are usual; taking only the patches that matter is ours.
 //! **Cost** 25 look-ups for each voxel next to the surface; memory of four masks and the runs of two.
+
+mod blur;
 
 use espalier_model::{Bits, Grid, LedgerEntry, LedgerKind};
 use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::runs::{Components, Connectivity, Run, Runs};
+use blur::blur;
 
-/// The Gaussian of σ = 0.7 at 0, 1 and 2 voxels, in units in which all five add up to [`KERNEL_SUM`]:
-/// exp(−k²/0.98) over their sum, in 65536ths.
-const KERNEL: [u64; 3] = [37378, 13473, 606];
-const KERNEL_SUM: u64 = KERNEL[0] + 2 * (KERNEL[1] + KERNEL[2]);
-/// The cut, as a share: below a half, so that thin branches keep their width.
-const CUT_PERCENT: u64 = 45;
 /// The most patches that the ledger lists one by one.
 const MAX_LISTED: usize = 2000;
-
-/// The weights of five voxels in a row, by the bits that are set.
-const ROW_WEIGHTS: [u64; 32] = {
-    let mut table = [0; 32];
-    let mut bits = 0;
-    while bits < 32 {
-        let mut place: usize = 0;
-        while place < 5 {
-            if bits >> place & 1 == 1 {
-                table[bits] += KERNEL[place.abs_diff(2)];
-            }
-            place += 1;
-        }
-        bits += 1;
-    }
-    table
-};
 
 /// 8 χ of each of the 256 sets of a 2×2×2 block of voxels about a vertex; voxel (x, y, z) of the block is bit
 /// 4z + 2y + x. The vertex owns itself, half of each of its 6 edges, a quarter of each of its 12 faces and an eighth
@@ -104,131 +83,12 @@ pub(crate) fn heal(mask: &mut Bits, grid: &Grid) -> Healed {
     keep_branches(mask, &mut smooth);
     let patches = Patches::between(mask, &smooth);
     let mut is_taken = patches.raise_euler_number(mask);
+    patches.leave_apart(mask, &mut is_taken);
     patches.apply(mask, &is_taken);
     let cut = patches.that_part(mask, &is_taken);
     patches.apply(mask, &cut);
     is_taken.iter_mut().zip(&cut).for_each(|(taken, &cut)| *taken &= !cut);
     patches.record(mask, grid, &is_taken)
-}
-
-/// The mask, blurred and cut.
-fn blur(mask: &Bits) -> Bits {
-    let [_, ny, nz] = mask.shape();
-    let near = near_surface(mask);
-    let mut smooth = mask.clone();
-    let words_per_slice = mask.words_per_row() * ny;
-    smooth.words_mut().par_chunks_mut(words_per_slice).enumerate().for_each(|(z, slice)| {
-        for y in 0..ny {
-            let row = near.row(z * ny + y);
-            for (word, &bits) in row.iter().enumerate().filter(|(_, bits)| **bits != 0) {
-                let mut left = bits;
-                while left != 0 {
-                    let bit = left.trailing_zeros();
-                    left &= left - 1;
-                    let is_set = blurred(mask, [word * 64 + bit as usize, y, z], nz) >= cut_level();
-                    let place = &mut slice[y * row.len() + word];
-                    *place = *place & !(1 << bit) | u64::from(is_set) << bit;
-                }
-            }
-        }
-    });
-    smooth
-}
-
-const fn cut_level() -> u64 {
-    KERNEL_SUM * KERNEL_SUM * KERNEL_SUM / 100 * CUT_PERCENT
-}
-
-/// The sum of the mask about a voxel, weighted by the kernel along each axis.
-fn blurred(mask: &Bits, [x, y, z]: [usize; 3], nz: usize) -> u64 {
-    let ny = mask.shape()[1];
-    let mut total = 0;
-    for (dz, weight_z) in (0..5).map(|dz: usize| (dz, KERNEL[dz.abs_diff(2)])) {
-        let Some(z) = (z + dz).checked_sub(2).filter(|&z| z < nz) else { continue };
-        let mut of_slice = 0;
-        for (dy, weight_y) in (0..5).map(|dy: usize| (dy, KERNEL[dy.abs_diff(2)])) {
-            let Some(y) = (y + dy).checked_sub(2).filter(|&y| y < ny) else { continue };
-            of_slice += weight_y * ROW_WEIGHTS[five_bits(mask.row(z * ny + y), x)];
-        }
-        total += weight_z * of_slice;
-    }
-    total
-}
-
-/// The bits x − 2 … x + 2 of a row.
-fn five_bits(row: &[u64], x: usize) -> usize {
-    let (word, bit) = (x / 64, x % 64);
-    let here = row[word];
-    let bits = if bit >= 2 {
-        let after = if bit > 61 { row.get(word + 1).map_or(0, |next| next << (66 - bit)) } else { 0 };
-        here >> (bit - 2) | after
-    } else {
-        let before = if word > 0 { row[word - 1] >> (62 + bit) } else { 0 };
-        here << (2 - bit) | before
-    };
-    (bits & 31) as usize
-}
-
-/// The voxels with both foreground and background among themselves and their 26 neighbours.
-fn near_surface(mask: &Bits) -> Bits {
-    let [_, ny, nz] = mask.shape();
-    let mut near = Bits::new(mask.shape());
-    let words_per_row = mask.words_per_row();
-    let is_used: Vec<bool> =
-        (0..mask.n_rows()).map(|row| mask.row(row).iter().any(|&word| word != 0)).collect();
-    near.words_mut().par_chunks_mut(words_per_row * ny).enumerate().for_each(|(z, slice)| {
-        let (mut any, mut all) = (vec![0; words_per_row], vec![0; words_per_row]);
-        for (y, out) in slice.chunks_mut(words_per_row).enumerate() {
-            let mut about = neighbour_rows([y, z]).filter(|&(y, z)| y < ny && z < nz);
-            if !about.any(|(y, z)| is_used[z * ny + y]) {
-                continue;
-            }
-            any.fill(0);
-            all.fill(u64::MAX);
-            for (y, z) in neighbour_rows([y, z]) {
-                let is_inside = y < ny && z < nz;
-                for word in 0..words_per_row {
-                    let bits = if is_inside { mask.row(z * ny + y)[word] } else { 0 };
-                    any[word] |= bits;
-                    all[word] &= bits;
-                }
-            }
-            for (word, out) in out.iter_mut().enumerate() {
-                *out = spread(&any, word) & !shrunk(&all, word);
-            }
-        }
-        clear_beyond(slice, words_per_row, mask.shape()[0]);
-    });
-    near
-}
-
-/// A row and the eight about it; beyond the first row the numbers wrap to beyond the last.
-fn neighbour_rows([y, z]: [usize; 2]) -> impl Iterator<Item = (usize, usize)> {
-    let about = |v: usize| [v.wrapping_sub(1), v, v + 1];
-    about(z).into_iter().flat_map(move |z| about(y).map(|y| (y, z)))
-}
-
-/// A word of a row, with each bit set that has a set neighbour.
-fn spread(row: &[u64], word: usize) -> u64 {
-    let before = if word > 0 { row[word - 1] >> 63 } else { 0 };
-    let after = row.get(word + 1).map_or(0, |next| next << 63);
-    row[word] | row[word] << 1 | row[word] >> 1 | before | after
-}
-
-/// A word of a row, with each bit kept that has both neighbours.
-fn shrunk(row: &[u64], word: usize) -> u64 {
-    let before = if word > 0 { row[word - 1] >> 63 } else { 0 };
-    let after = row.get(word + 1).map_or(0, |next| next << 63);
-    row[word] & (row[word] << 1 | before) & (row[word] >> 1 | after)
-}
-
-/// Clears the bits beyond nx in the last word of each row.
-fn clear_beyond(words: &mut [u64], words_per_row: usize, nx: usize) {
-    if !nx.is_multiple_of(64) {
-        words.iter_mut().skip(words_per_row - 1).step_by(words_per_row).for_each(|word| {
-            *word &= (1 << (nx % 64)) - 1;
-        });
-    }
 }
 
 /// Puts back into `smooth` what it has lost of thin branches.
@@ -324,6 +184,16 @@ impl Patches {
             rise[piece] += i64::from(EULER_OF_BLOCK[before ^ flipped] - EULER_OF_BLOCK[before]);
         }
         rise.iter().map(|&rise| rise > 0).collect()
+    }
+
+    /// Of the patches that are taken, leaves out those that touch more than one component of the mask.
+    fn leave_apart(&self, mask: &Bits, is_taken: &mut [bool]) {
+        let before = Runs::cut(mask);
+        let bodies = before.components(Connectivity::All);
+        if bodies.n_components > 1 {
+            let joins = pieces_that_join(&self.runs, &self.pieces, &before, &bodies, false);
+            is_taken.iter_mut().zip(joins).for_each(|(taken, joins)| *taken &= !joins);
+        }
     }
 
     fn to_bits(&self, shape: [usize; 3]) -> Bits {
@@ -431,38 +301,42 @@ mod tests {
     }
 
     #[test]
-    fn the_blur_equals_a_plain_sum() {
-        for case in 0..60 {
-            let bits = random_bits(case);
-            let smooth = blur(&bits);
-            let [nx, ny, nz] = bits.shape();
-            for voxel in (0..nx * ny * nz).map(|i| [i % nx, i / nx % ny, i / (nx * ny)]) {
-                let mut sum = 0;
-                for step in 0..125_i64 {
-                    let d = [step % 5 - 2, step / 5 % 5 - 2, step / 25 - 2];
-                    let at = [0, 1, 2].map(|axis| voxel[axis] as i64 + d[axis]);
-                    let weight: u64 = d.iter().map(|v| KERNEL[v.unsigned_abs() as usize]).product();
-                    sum += if bits.contains(at) { weight } else { 0 };
-                }
-                assert_eq!(smooth.get(voxel), sum >= cut_level(), "case {case} {voxel:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn random_masks_gain_no_tunnel_and_no_component() {
+    fn random_masks_gain_no_tunnel_and_keep_their_components() {
         let components = |bits: &Bits| Runs::cut(bits).components(Connectivity::All).n_components;
         let mut n_closed = 0;
-        for case in 0..300 {
+        for case in 0..1500 {
             let before = random_bits(case);
             let mut after = before.clone();
             let healed = heal(&mut after, &grid(&before));
-            assert!(components(&after) <= components(&before), "case {case}");
+            assert_eq!(components(&after), components(&before), "case {case}");
             assert!(euler_number(&after) >= euler_number(&before), "case {case}");
             assert_eq!(healed.entries.len(), healed.n_patches);
             n_closed += healed.n_patches;
         }
         assert!(n_closed > 50, "{n_closed}");
+    }
+
+    /// A plate with a hole of nine voxels about another component, and a pinhole at its corner: filled together, both
+    /// tunnels are closed and the components joined. The Euler number rises all the same.
+    #[test]
+    fn a_patch_that_joins_components_is_left_out() {
+        let mut plate = Bits::new([12, 10, 3]);
+        (1..9).for_each(|y| plate.fill_run(10 + y, 1..11));
+        let smooth = plate.clone();
+        (3..6).for_each(|y| plate.clear_run(10 + y, 3..6));
+        plate.set([4, 4, 1]);
+        plate.clear([6, 6, 1]);
+        let patches = Patches::between(&plate, &smooth);
+        let mut is_taken = patches.raise_euler_number(&plate);
+        assert_eq!(is_taken, [true]);
+        patches.leave_apart(&plate, &mut is_taken);
+        assert_eq!(is_taken, [false]);
+        // Without the component in the hole there is nothing to join.
+        plate.clear([4, 4, 1]);
+        let patches = Patches::between(&plate, &smooth);
+        let mut is_taken = patches.raise_euler_number(&plate);
+        patches.leave_apart(&plate, &mut is_taken);
+        assert_eq!(is_taken, [true]);
     }
 
     #[test]

@@ -73,8 +73,10 @@ mod read_mask;
 mod stream;
 
 mod error;
+mod options;
 mod params;
 mod read_error;
+mod spacing;
 
 pub use dicom::{DicomError, Irregularity, Listed, Obstacle, is_dicom_folder};
 pub use error::Error;
@@ -82,9 +84,11 @@ pub use euler::euler_number;
 pub use growth::{GROWTH_COLUMNS, Growth, Knee, Level, Towards};
 pub use kind::{Kind, check_regions, inspect_kind};
 pub use labels::{Label, Labels};
-pub use params::{AssumedSpace, Components, Method, Params, Preset, ReadOptions, Spacing};
+pub use options::{AssumedSpace, ReadOptions};
+pub use params::{Components, Method, Params, Preset};
 pub use read::{Loaded, files, read};
 pub use read_error::ReadError;
 pub use read_mask::read_mask;
 pub use segment::{Segmented, clean, segment};
+pub use spacing::Spacing;
 pub use trachea::{SEED_COLUMNS, SeedCandidate, seeds_to_tsv};

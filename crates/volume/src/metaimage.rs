@@ -11,7 +11,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use espalier_model::Report;
+use espalier_model::{RAS_FROM_LPS, Report};
 use glam::{DAffine3, DMat3, DVec3};
 
 use crate::ascii::AsciiStream;
@@ -20,7 +20,7 @@ use crate::scalar::Scalar;
 use crate::source::{Packing, Source};
 use crate::stored::{self, FileStream, Stored, VoxelStream};
 use crate::text::{self, Lines};
-use crate::{AssumedSpace, ReadError, ReadOptions, detached};
+use crate::{ReadError, ReadOptions, detached};
 
 /// The key whose line ends the header.
 const LAST_KEY: &str = "ElementDataFile";
@@ -208,7 +208,7 @@ fn world_from_voxel(
     if options.unit_mm.is_none() && unit_mm != 1.0 {
         report.warn("W-META-UNITS", "lengths are in DistanceUnits as the header says; ITK takes them for mm");
     }
-    let ras_mm = AssumedSpace::Lps.ras_signs() * unit_mm;
+    let ras_mm = RAS_FROM_LPS * unit_mm;
     let ras_from_voxel = DMat3::from_diagonal(ras_mm) * lps_from_voxel;
     warn_if_orientation_disagrees(keys, ras_from_voxel, report);
     Ok(DAffine3::from_mat3_translation(ras_from_voxel, ras_mm * vector(&origin, 0.0)))

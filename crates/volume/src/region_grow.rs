@@ -104,6 +104,7 @@ fn choose_band(
         return Ok((Some(growth), band));
     }
     let threshold = growth.threshold().ok_or_else(|| no_knee(&growth))?;
+    warn_of_no_leak(&growth, limit, report);
     let band = match towards {
         Towards::Bright => (band.0, threshold),
         Towards::Dark => (threshold, band.1),
@@ -133,6 +134,26 @@ fn warn_of_leak(growth: &Growth, limit: f64, report: &mut Report) {
             ),
         );
     }
+}
+
+/// Where nothing leaks the band goes on as far as the preset allows, which is no finding: the user must hear of it.
+fn warn_of_no_leak(growth: &Growth, limit: f64, report: &mut Report) {
+    let (None, Some(&last)) = (growth.leak(), growth.levels.last()) else { return };
+    report.count("reached_threshold", last.threshold);
+    report.count("reached_ml", growth.ml(last));
+    let (n_voxels, ml, threshold) = (last.n_voxels, growth.ml(last), last.threshold);
+    let message = if growth.is_small() {
+        format!(
+            "the region has {n_voxels} voxels ({ml:.2} ml) at {threshold}, too few to tell a leak: is the seed inside the \
+             organ?"
+        )
+    } else {
+        format!(
+            "no leak found up to {threshold} (the preset goes to {limit}): the region holds all {ml:.1} ml that the seed \
+             reaches; look whether they are the organ's, or set the band"
+        )
+    };
+    report.warn("W-VOLUME-NO-LEAK", message);
 }
 
 fn no_knee(growth: &Growth) -> Error {

@@ -15,9 +15,9 @@ use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 
 use crate::Error;
+use crate::Spacing;
 use crate::error::check_memory;
 use crate::interpolate::{Lookup, ROUNDING, bytes_per_voxel, resample_voxels};
-use crate::params::Spacing;
 
 /// A spacing that differs by less, as a share, is the same: files round to single precision.
 const SAME: f64 = 1e-5;

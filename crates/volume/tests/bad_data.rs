@@ -257,3 +257,45 @@ fn damage_is_told_from_truncation() {
             .is_err_and(|text| text.contains("more bytes follow the voxels than the 1048576"))
     );
 }
+
+fn gzipped(bytes: &[u8]) -> Vec<u8> {
+    let mut gz = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    std::io::Write::write_all(&mut gz, bytes).expect("to memory");
+    gz.finish().expect("to memory")
+}
+
+/// Numbers written out have no checksum of their own, but the gzip file around them has.
+#[test]
+fn compressed_text_is_verified() {
+    let folder = scratch();
+    let path = folder.path().join("written.nrrd.gz");
+    let [.., (name, written), _, _] = text_files();
+    assert_eq!(name, "written.nrrd");
+    let packed = gzipped(&written);
+    std::fs::write(&path, &packed).expect("writable");
+    assert_eq!(outcome(&path, &OPTIONS), "9x8x7 LPS");
+    let mut damaged = packed;
+    let checksum = damaged.len() - 8;
+    damaged[checksum] ^= 1;
+    std::fs::write(&path, &damaged).expect("writable");
+    assert_eq!(outcome(&path, &OPTIONS), "E-VOLUME-CORRUPT 3");
+}
+
+/// `byte skip: -1` counts from the end of the stream, which must not be unpacked for a volume that is not allowed.
+#[test]
+fn what_is_refused_is_not_unpacked() {
+    let folder = scratch();
+    let path = folder.path().join("skip.nrrd");
+    let nrrd = |sizes: &str, data: &[u8]| {
+        let header = format!(
+            "NRRD0005\ntype: uchar\ndimension: 3\nspace: left-posterior-superior\nsizes: {sizes}\n\
+             space directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\nencoding: gzip\nbyte skip: -1\n\n"
+        );
+        std::fs::write(&path, [header.as_bytes(), &gzipped(data)].concat()).expect("writable");
+        outcome(&path, &OPTIONS)
+    };
+    assert_eq!(nrrd("2 2 2", b"skipped 12345678"), "2x2x2 LPS");
+    // 64 MiB of zeros, where 16 may be held: refused at the header, not after the drain.
+    assert_eq!(nrrd("512 512 256", &vec![0; 64 << 20]), "E-VOLUME-TOO-LARGE 5");
+    assert_eq!(nrrd("100000 100000 1000", b"few bytes"), "E-VOLUME-TRUNCATED 3");
+}

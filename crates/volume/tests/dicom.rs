@@ -142,6 +142,13 @@ fn gaps_and_uneven_distances() {
     let filled = read_slices(&gap, &RESAMPLE).expect("resampled");
     assert_eq!(filled.volume.grid().shape(), [6, 5, 8]);
     assert_eq!(filled.report.warnings[0].code, "W-DICOM-RESAMPLED");
+    // How much was made up stands beside it.
+    let message = &filled.report.warnings[0].message;
+    assert!(message.contains("2 slices are missing after slice 3"), "{message}");
+    assert!(message.contains("2 of 8 planes lie between slices, up to 6.00 mm apart"), "{message}");
+    let count = |name: &str| filled.report.get(name);
+    assert_eq!((count("dicom_missing_slices"), count("dicom_planes_between_slices")), (Some(2.0), Some(2.0)));
+    assert_eq!((count("dicom_widest_gap_mm"), count("dicom_voxels_outside_slices")), (Some(6.0), Some(0.0)));
     // Values grow by 100 a mm of height, so between slices too.
     assert_eq!(value_at(&filled.volume, [20.0, 30.0, 8.0]), -200.0);
 
@@ -195,6 +202,8 @@ fn tilt_is_refused_or_resampled() {
         }
     }
     assert_eq!(n_outside, 24 * 5 * 6);
+    assert_eq!(resampled.report.get("dicom_voxels_outside_slices"), Some(f64::from(24 * 5 * 6)));
+    assert!((resampled.report.get("dicom_tilt_deg").expect("a tilt") - 11.31).abs() < 0.01);
 }
 
 #[test]

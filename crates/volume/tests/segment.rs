@@ -225,3 +225,54 @@ fn presets_on_hostile_volumes() {
         }
     }
 }
+
+/// A band that nothing ends but the preset's limit is no finding, and neither is a handful of voxels.
+#[test]
+fn a_region_that_never_leaks_is_told() {
+    let lumen = |extent: usize| {
+        let shape = [extent + 4; 3];
+        let inside = |v: usize| (2..extent + 2).contains(&v);
+        let at = |(z, y, x)| if inside(x) && inside(y) && inside(z) { -950_i16 } else { 40 };
+        let grid = Grid::axis_aligned(shape, DVec3::ONE, DVec3::ZERO).expect("legal");
+        let array = Array3::from_shape_fn((shape[2], shape[1], shape[0]), at);
+        Volume::new(grid, Voxels::I16(array), 1.0, 0.0)
+    };
+    let params = Params {
+        preset: Some(Preset::Airway),
+        method: Method::RegionGrow,
+        seed_voxel: Some([4, 4, 4]),
+        ..Params::default()
+    };
+    for (extent, said) in [(12, "no leak found up to -500"), (6, "216 voxels (0.22 ml) at -500, too few")] {
+        let grown = segment(&lumen(extent), &params).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(grown.mask.n_foreground(), extent * extent * extent);
+        let warning = grown.report.warnings.iter().find(|warning| warning.code == "W-VOLUME-NO-LEAK");
+        let message = &warning.expect("a warning").message;
+        assert!(message.contains(said), "{message}");
+        assert_eq!(grown.report.get("reached_threshold"), Some(-500.0));
+    }
+    // A band that the user gives is the user's.
+    let given =
+        segment(&lumen(12), &Params { upper: Some(-500.0), ..params }).unwrap_or_else(|e| panic!("{e}"));
+    assert!(given.report.warnings.is_empty(), "{:?}", given.report.warnings);
+}
+
+/// A hollow ball whose wall has a pinhole: closing the tunnel closes a cavity in, which is filled and counted.
+#[test]
+fn cavities_that_closing_a_tunnel_makes_are_counted() {
+    let shape = [17; 3];
+    let grid = Grid::axis_aligned(shape, DVec3::ONE, DVec3::ZERO).expect("legal");
+    let distance = |[x, y, z]: [usize; 3]| (DVec3::new(x as f64, y as f64, z as f64) - 8.0).length();
+    let mut mask = espalier_model::Mask::from_fn(grid, |voxel| (3.5..6.5).contains(&distance(voxel)));
+    // Two holes through the wall make one tunnel.
+    for x in [1, 2, 3, 4, 12, 13, 14, 15] {
+        mask.bits_mut().clear([x, 8, 8]);
+    }
+    let cleaned = espalier_volume::clean(mask.clone(), &Params::default()).unwrap_or_else(|e| panic!("{e}"));
+    let count = |name: &str| cleaned.report.get(name);
+    assert_eq!((count("tunnels"), count("tunnels_left")), (Some(1.0), Some(0.0)));
+    assert_eq!(count("cavities_filled"), Some(1.0));
+    let n_added = cleaned.mask.n_foreground() - mask.n_foreground();
+    let n_told = ["cavities_filled_voxels", "tunnel_repairs_filled_voxels"].map(count);
+    assert_eq!(n_told.into_iter().flatten().sum::<f64>(), n_added as f64);
+}

@@ -13,6 +13,8 @@ use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use flate2::read::ZlibDecoder;
 
+use crate::bytes::from_lowest;
+
 /// How a file writes its arrays.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Encoding {
@@ -97,7 +99,7 @@ pub(super) fn numbers(bytes: &[u8], scalar: &str, is_big_endian: bool) -> Option
                 .as_chunks::<{ size_of::<$number>() }>()
                 .0
                 .iter()
-                .map(|&number| if is_big_endian { <$number>::from_be_bytes(number) } else { <$number>::from_le_bytes(number) } as f64)
+                .map(|&number| <$number>::from_le_bytes(from_lowest(number, is_big_endian)) as f64)
                 .collect()
         };
     }
@@ -115,7 +117,7 @@ pub(super) fn numbers(bytes: &[u8], scalar: &str, is_big_endian: bool) -> Option
             .as_chunks::<8>()
             .0
             .iter()
-            .map(|&n| if is_big_endian { f64::from_be_bytes(n) } else { f64::from_le_bytes(n) })
+            .map(|&number| f64::from_le_bytes(from_lowest(number, is_big_endian)))
             .collect(),
         _ => return None,
     })

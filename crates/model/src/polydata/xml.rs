@@ -3,8 +3,10 @@
 //! **Input** bytes. **Output** [`Dataset`].
 //! **Steps** 1. appended bytes, which are no XML, are cut out; 2. the XML; 3. of each piece the points, the lines, and
 //! the arrays that are used; 4. pieces one after another.
-//! **Guarantees** declared counts are compared with what the bytes can hold before anything is made of them; external
-//! entities are not resolved.
+//! **Guarantees** declared counts are compared with what the bytes can hold before anything is made of them, and all
+//! pieces together make no more than [`MAX_NUMBERS`] of compressed ones; external entities are not resolved.
+
+use std::cell::Cell;
 
 use roxmltree::{Document, Node};
 
@@ -20,7 +22,13 @@ struct File<'a> {
     /// Where arrays begin in them, ascending.
     offsets: Vec<usize>,
     n_bytes: usize,
+    /// How many more numbers its arrays may make, all pieces together.
+    n_left: Cell<usize>,
 }
+
+/// Arrays of numbers that no file of polylines has: 1 GiB. Several pieces may name the same compressed bytes, so that
+/// what each of them makes is not bounded by the file.
+const MAX_NUMBERS: usize = 1 << 27;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Dataset, PolydataError> {
     let (text, appended) = cut_appended(bytes);
@@ -38,6 +46,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Dataset, PolydataError> {
             == Some("raw"),
         offsets: offsets(root),
         n_bytes: bytes.len(),
+        n_left: Cell::new(MAX_NUMBERS),
     };
     let mut dataset = Dataset { space: space(root), ..Dataset::default() };
     for piece in root.descendants().filter(|node| node.has_tag_name("Piece")) {
@@ -219,6 +228,12 @@ impl File<'_> {
                     found: scalar.to_owned(),
                 })?;
                 let damaged = |cause| PolydataError::Bytes { array: name(), cause };
+                let n_left = self.n_left.get().checked_sub(expected);
+                self.n_left
+                    .set(n_left.ok_or_else(|| damaged("with it the file holds more than 1 GiB of numbers"))?);
+                if expected == 0 {
+                    return Ok(Vec::new());
+                }
                 let expected_bytes = expected.saturating_mul(number_bytes);
                 let packed = match format {
                     "binary" => encoded::from_base64(text.as_bytes()),
@@ -244,5 +259,32 @@ impl File<'_> {
         let bytes =
             appended.get(offset..next.min(appended.len())).ok_or("its offset lies behind the data")?;
         if self.is_appended_raw { Ok(bytes.to_vec()) } else { encoded::from_base64(bytes) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two pieces of one file that name the same bytes, and both more than the file may make of them.
+    #[test]
+    fn pieces_are_bounded_together() {
+        // The length, 8 bytes, and 8 numbers of one byte.
+        let text = "<DataArray type=\"UInt8\" format=\"binary\">CAAAAAECAwQFBgcI</DataArray>";
+        let document = Document::parse(text).expect("legal XML");
+        let encoding = Encoding { is_big_endian: false, word_bytes: 4, is_compressed: false };
+        let file = File {
+            encoding,
+            appended: None,
+            is_appended_raw: false,
+            offsets: Vec::new(),
+            n_bytes: text.len(),
+            n_left: Cell::new(20),
+        };
+        let read = || file.numbers(document.root_element(), 8);
+        assert_eq!(read().expect("8 of 20").len(), 8);
+        assert_eq!(read().expect("16 of 20").len(), 8);
+        let error = read().expect_err("24 of 20").to_string();
+        assert!(error.contains("1 GiB"), "{error}");
     }
 }

@@ -7,8 +7,8 @@
 //! wants it.
 //! **Guarantees** the same numbers at any thread count; of several faulty slices the lowest is named.
 
-use espalier_model::{Report, Voxels};
-use glam::{DAffine3, DMat3, DVec3};
+use espalier_model::{RAS_FROM_LPS, Report, Voxels};
+use glam::DAffine3;
 use ndarray::Array3;
 use rayon::prelude::*;
 
@@ -21,8 +21,6 @@ use super::stack::Stack;
 use crate::interpolate::Number;
 use crate::{ReadError, ReadOptions};
 
-/// RAS+ from LPS+.
-const RAS_FROM_LPS: DMat3 = DMat3::from_diagonal(DVec3::new(-1.0, -1.0, 1.0));
 /// What decoding one pixel takes beside the volume, at most: a decoder of JPEG 2000 keeps coefficients, blocks, and
 /// samples in single precision.
 const DECODER_BYTES_PER_PIXEL: u64 = 64;
@@ -100,11 +98,15 @@ pub(super) fn assemble(
         // Signed and unsigned slices in one series: scaled at once.
         let (shape, affine, array) = job.run(report)?;
         let voxels = Voxels::F32(array);
-        let world_from_voxel = DAffine3::from_mat3(RAS_FROM_LPS) * affine;
+        let world_from_voxel = ras_from_lps() * affine;
         return Ok(Assembled { shape, world_from_voxel, voxels, slope: 1.0, intercept: 0.0 });
     };
-    let world_from_voxel = DAffine3::from_mat3(RAS_FROM_LPS) * lps_from_voxel;
+    let world_from_voxel = ras_from_lps() * lps_from_voxel;
     Ok(Assembled { shape, world_from_voxel, voxels, slope, intercept })
+}
+
+fn ras_from_lps() -> DAffine3 {
+    DAffine3::from_scale(RAS_FROM_LPS)
 }
 
 fn count_scalings(stack: &Stack) -> usize {
@@ -148,7 +150,8 @@ impl Job<'_> {
             return Ok((shape, self.even_affine(), array));
         };
         let mut new = allocate::<T>(plan.shape)?;
-        resample::resample((&voxels, self.scaling), &plan, &mut new, report);
+        let irregularity = &self.stack.irregularity;
+        resample::resample((&voxels, self.scaling), (&plan, irregularity), &mut new, report);
         let shape = plan.shape;
         Ok((shape, plan.lps_from_voxel, as_array(new, shape)?))
     }

@@ -186,19 +186,80 @@ fn check_jpeg_2000(stream: &[u8], [width, height]: [usize; 2]) -> Result<Jpeg200
     Ok(Jpeg2000Header { precision, is_signed: bits & 0x80 != 0 })
 }
 
-/// Wherever coding styles stand, in the main header or a tile's, precincts must not be tiny.
-fn check_precincts(stream: &[u8], mut at: usize) -> Result<(), String> {
-    const CODING_STYLE: [u8; 2] = [0xFF, 0x52];
-    const TILE: [u8; 2] = [0xFF, 0x90];
-    while let Some(marker) = stream.get(at..at + 2).filter(|marker| *marker != TILE) {
+/// Wherever coding styles stand, in the main header or in that of a part of a tile, precincts must not be tiny.
+fn check_precincts(stream: &[u8], start: usize) -> Result<(), String> {
+    const TILE_PART: [u8; 2] = [0xFF, 0x90];
+    const DATA: [u8; 2] = [0xFF, 0x93];
+    let mut at = start;
+    // Where the part of a tile ends whose header is being read.
+    let mut part_end = None;
+    while let Some(marker) = stream.get(at..at + 2).filter(|marker| *marker != [0xFF, END]) {
+        if marker == DATA {
+            // Parts follow each other; one of length 0 goes on to the end.
+            at = match part_end.take() {
+                Some(end) if end > at => end,
+                _ => break,
+            };
+            continue;
+        }
         let body = segment(stream, at + 2).ok_or("a segment is cut short")?;
-        // Style, four bytes for all components, five for each; then a byte for each resolution.
-        let has_precincts = marker == CODING_STYLE && body.first().is_some_and(|style| style & 1 == 1);
+        if marker == TILE_PART {
+            let length =
+                body.get(2..).and_then(|rest| rest.first_chunk()).map(|&four| u32::from_be_bytes(four));
+            let length = length.ok_or("the header of a tile is cut short")? as usize;
+            part_end = (length > 0).then(|| at.saturating_add(length));
+        }
         let is_tiny = |byte: &u8| (byte & 0x0F).min(byte >> 4) < MIN_PRECINCT;
-        if has_precincts && body.iter().skip(10).any(is_tiny) {
+        if precincts(marker, body).iter().any(is_tiny) {
             return Err("its precincts are tiny".to_owned());
         }
         at += 4 + body.len();
     }
     Ok(())
+}
+
+/// The sizes of precincts that a segment states, a byte for each resolution; none where it is no coding style, or states
+/// none.
+fn precincts<'a>(marker: &[u8], body: &'a [u8]) -> &'a [u8] {
+    // Of all components: the style, four bytes, five; of one: its number, the style, five.
+    let (style, first) = match marker {
+        [0xFF, 0x52] => (0, 10),
+        [0xFF, 0x53] => (1, 7),
+        _ => return &[],
+    };
+    let has_precincts = body.get(style).is_some_and(|style| style & 1 == 1);
+    body.get(first..).filter(|_| has_precincts).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn segment_of(marker: u8, body: &[u8]) -> Vec<u8> {
+        let length = (body.len() as u16 + 2).to_be_bytes();
+        [&[0xFF, marker], length.as_slice(), body].concat()
+    }
+
+    /// A part of a tile: its header with these segments, and four bytes of data.
+    fn part(segments: &[Vec<u8>]) -> Vec<u8> {
+        let rest = [segments.concat().as_slice(), &[0xFF, 0x93, 1, 2, 3, 4]].concat();
+        let length = (rest.len() as u32 + 12).to_be_bytes();
+        let body = [&[0, 0], length.as_slice(), &[0, 1]].concat();
+        [segment_of(0x90, &body), rest].concat()
+    }
+
+    #[test]
+    fn tiny_precincts_are_found_wherever_they_stand() {
+        let style = |precinct: u8| segment_of(0x52, &[1, 0, 0, 1, 0, 1, 4, 4, 0, 0, precinct, precinct]);
+        let of_component = |precinct: u8| segment_of(0x53, &[0, 1, 1, 4, 4, 0, 0, precinct, precinct]);
+        let check =
+            |parts: &[Vec<u8>]| check_precincts(&[&parts.concat(), &[0xFF, END][..]].concat(), 0).is_ok();
+        assert!(check(&[style(0x88), part(&[]), part(&[style(0x77), of_component(0x66)])]));
+        assert!(!check(&[style(0x80), part(&[])]));
+        assert!(!check(&[style(0x88), of_component(0x08), part(&[])]));
+        assert!(!check(&[style(0x88), part(&[style(0x11)])]));
+        assert!(!check(&[style(0x88), part(&[]), part(&[of_component(0x11)])]));
+        // Without the bit that says so, none are stated.
+        assert!(check(&[segment_of(0x52, &[0, 0, 0, 1, 0, 1, 4, 4, 0, 0, 0, 0]), part(&[])]));
+    }
 }

@@ -12,6 +12,8 @@
 //! kill the program, and a file of 300 bytes that declares a string of 2 GiB takes 2.1 GB of memory (0.10.1).
 //! What is needed of a header is a dozen numbers.
 
+use espalier_model::bytes::from_lowest;
+
 /// A tag: group in the high 16 bits, element in the low ones.
 pub(super) type Tag = u32;
 
@@ -287,7 +289,7 @@ impl Elements {
     /// An unsigned number of 16 bits.
     pub(super) fn short(&self, tag: Tag) -> Option<u16> {
         let pair = self.raw(tag)?.first_chunk().copied()?;
-        Some(if self.encoding.is_big_endian { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) })
+        Some(u16::from_le_bytes(from_lowest(pair, self.encoding.is_big_endian)))
     }
 }
 
@@ -328,10 +330,8 @@ impl Element {
 fn read_element(bytes: &[u8], at: usize, encoding: Encoding) -> Result<Element, Fault> {
     let &[a, b, c, d, e, f, g, h] =
         bytes.get(at..).and_then(|rest| rest.first_chunk()).ok_or(Fault::Short)?;
-    let short =
-        |pair| if encoding.is_big_endian { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) };
-    let long =
-        |four| if encoding.is_big_endian { u32::from_be_bytes(four) } else { u32::from_le_bytes(four) };
+    let short = |pair| u16::from_le_bytes(from_lowest(pair, encoding.is_big_endian));
+    let long = |four| u32::from_le_bytes(from_lowest(four, encoding.is_big_endian));
     let tag = u32::from(short([a, b])) << 16 | u32::from(short([c, d]));
     let is_delimiter = matches!(tag, ITEM | ITEM_END | SEQUENCE_END);
     let states = encoding.is_explicit && !is_delimiter && e.is_ascii_uppercase() && f.is_ascii_uppercase();

@@ -3,12 +3,13 @@
 //! **Input** a path. **Output** [`Object`].
 //! **Steps** 1. the first bytes of the file, and more of them as long as the pixels are not reached; 2. its elements;
 //! 3. each field that a slice needs, checked.
-//! **Guarantees** at most the limit is read into memory; what is kept is geometry and how intensities are stored,
+//! **Guarantees** at most the limit is read into memory, by all threads together but for small files; what is kept is geometry and how intensities are stored,
 //! and the identifiers by which files are told to belong together, which are only ever compared.
 
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use flate2::read::DeflateDecoder;
 use glam::DVec3;
@@ -99,18 +100,26 @@ pub(super) enum Found {
     Image(Box<Object>),
 }
 
-/// Looks at one file.
-pub(super) fn inspect(path: &Path, max_bytes: u64) -> std::io::Result<Found> {
+/// Looks at one file. What takes more than a few bytes waits at the gate for its turn, so that files looked at side by
+/// side do not take the limit each.
+pub(super) fn inspect(path: &Path, max_bytes: u64, gate: &Mutex<()>) -> std::io::Result<Found> {
+    let mut turn = None;
     let mut file = File::open(path)?;
     let n_file = file.metadata()?.len();
     let mut bytes = Vec::new();
     loop {
         let n_wanted = (bytes.len() as u64 * GROWTH).max(FIRST_BYTES).min(n_file);
+        if !bytes.is_empty() {
+            turn.get_or_insert_with(|| gate.lock().unwrap_or_else(PoisonError::into_inner));
+        }
         (&mut file).take(n_wanted - bytes.len() as u64).read_to_end(&mut bytes)?;
         if !tag::looks_like_dicom(&bytes) {
             return Ok(Found::Other);
         }
         let is_whole = bytes.len() as u64 >= n_file || (bytes.len() as u64) < n_wanted;
+        if is_whole && read_meta(&bytes).syntax.is_some_and(|uid| Syntax::of_uid(&uid) == Syntax::Deflated) {
+            turn.get_or_insert_with(|| gate.lock().unwrap_or_else(PoisonError::into_inner));
+        }
         let data_set = read_data_set(&bytes, max_bytes, is_whole);
         let is_short = data_set.elements.fault == Some(Fault::Short);
         if is_whole || !is_short || n_wanted.saturating_mul(GROWTH) > max_bytes {
@@ -157,7 +166,7 @@ fn read_data_set(bytes: &[u8], max_bytes: u64, is_whole: bool) -> DataSet {
 }
 
 /// A deflated data set, as far as it goes and the limit allows.
-pub(super) fn inflate(deflated: &[u8], max_bytes: u64) -> Vec<u8> {
+fn inflate(deflated: &[u8], max_bytes: u64) -> Vec<u8> {
     let mut inflated = Vec::new();
     // What came out before damage stands; the walk over it says where it ends.
     let _ = DeflateDecoder::new(deflated).take(max_bytes).read_to_end(&mut inflated);

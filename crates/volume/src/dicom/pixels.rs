@@ -10,14 +10,20 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
-use super::header::{StoredPixels, inflate};
+use espalier_model::bytes::from_lowest;
+use flate2::read::DeflateDecoder;
+
+use super::header::StoredPixels;
 use super::syntax::Syntax;
 use super::{codec, element, rle};
+
+/// More than any group before the data set has.
+const MAX_META_BYTES: u64 = 1 << 20;
 
 /// Reads and decodes one slice; the error says what is wrong with it.
 pub(super) fn decode(path: &Path, stored: &StoredPixels, max_bytes: u64) -> Result<Vec<i32>, String> {
     if stored.syntax.is_native() {
-        return Ok(cut_out(&cells(&native_bytes(path, stored, max_bytes)?, stored), stored));
+        return Ok(cut_out(&cells(&native_bytes(path, stored)?, stored), stored));
     }
     decompress(&fragments(path, stored, max_bytes)?, stored)
 }
@@ -43,7 +49,7 @@ fn decompress(stream: &[u8], stored: &StoredPixels) -> Result<Vec<i32>, String> 
 pub(super) fn are_equal(a: (&Path, &StoredPixels), b: (&Path, &StoredPixels), max_bytes: u64) -> bool {
     let bytes = |(path, stored): (&Path, &StoredPixels)| {
         if stored.syntax.is_native() {
-            native_bytes(path, stored, max_bytes)
+            native_bytes(path, stored)
         } else {
             fragments(path, stored, max_bytes)
         }
@@ -55,13 +61,10 @@ pub(super) fn are_equal(a: (&Path, &StoredPixels), b: (&Path, &StoredPixels), ma
     form(a.1) == form(b.1) && bytes(a).is_ok_and(|pixels| bytes(b) == Ok(pixels))
 }
 
-fn native_bytes(path: &Path, stored: &StoredPixels, max_bytes: u64) -> Result<Vec<u8>, String> {
+fn native_bytes(path: &Path, stored: &StoredPixels) -> Result<Vec<u8>, String> {
     let (start, n_bytes) = (stored.place.offset, stored.n_bytes());
     if stored.syntax == Syntax::Deflated {
-        let file = std::fs::read(path).map_err(|error| error.to_string())?;
-        let inflated = inflate(&file[element::read_meta(&file).end.min(file.len())..], max_bytes);
-        let pixels = inflated.get(start..).and_then(|rest| rest.get(..n_bytes));
-        return pixels.map(<[u8]>::to_vec).ok_or_else(|| "the deflated pixels are cut short".to_owned());
+        return inflated_bytes(path, start as u64, n_bytes).map_err(|error| error.to_string());
     }
     let mut file = File::open(path).map_err(|error| error.to_string())?;
     file.seek(SeekFrom::Start(start as u64)).map_err(|error| error.to_string())?;
@@ -71,6 +74,22 @@ fn native_bytes(path: &Path, stored: &StoredPixels, max_bytes: u64) -> Result<Ve
         return Err(format!("{n_bytes} bytes expected, {} found", bytes.len()));
     }
     Ok(bytes)
+}
+
+/// Bytes of a deflated data set; nothing else of it is held.
+fn inflated_bytes(path: &Path, start: u64, n_bytes: usize) -> std::io::Result<Vec<u8>> {
+    let mut file = BufReader::new(File::open(path)?);
+    let mut meta = Vec::new();
+    (&mut file).take(MAX_META_BYTES).read_to_end(&mut meta)?;
+    let packed = meta.get(element::read_meta(&meta).end..).unwrap_or_default();
+    let mut data_set = DeflateDecoder::new(packed.chain(file));
+    std::io::copy(&mut (&mut data_set).take(start), &mut std::io::sink())?;
+    let mut pixels = Vec::new();
+    data_set.take(n_bytes as u64).read_to_end(&mut pixels)?;
+    if pixels.len() < n_bytes {
+        return Err(std::io::Error::other("the deflated pixels are cut short"));
+    }
+    Ok(pixels)
 }
 
 /// The fragments of a compressed image, put together; the table of offsets before them is passed over.
@@ -110,8 +129,8 @@ fn cells(bytes: &[u8], stored: &StoredPixels) -> Vec<i32> {
         }
         return cells;
     }
-    let decode = if is_big_endian { u16::from_be_bytes } else { u16::from_le_bytes };
-    bytes.as_chunks::<2>().0.iter().map(|&pair| i32::from(decode(pair))).collect()
+    let decode = |pair| i32::from(u16::from_le_bytes(from_lowest(pair, is_big_endian)));
+    bytes.as_chunks::<2>().0.iter().map(|&pair| decode(pair)).collect()
 }
 
 /// The value in each cell: overlays may use the bits beside it.

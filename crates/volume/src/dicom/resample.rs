@@ -14,8 +14,12 @@ use espalier_model::Report;
 use glam::{DAffine3, DVec2};
 use rayon::prelude::*;
 
+use super::error::Irregularity;
 use super::stack::Stack;
 use crate::interpolate::{Between, Number, Policy};
+
+/// A plane is a slice if it is nearer than this share of the step: positions are written with few decimals.
+const ON_SLICE: f64 = 0.02;
 
 /// The grid, and where the slices lie on it.
 pub(super) struct Plan {
@@ -23,8 +27,9 @@ pub(super) struct Plan {
     /// Maps voxel coordinates to LPS+ mm.
     pub(super) lps_from_voxel: DAffine3,
     old_size: [usize; 2],
-    /// The position of each slice along the normal, in new planes.
+    /// The position of each slice along the normal, in new planes, and their distance in mm.
     heights: Vec<f64>,
+    step_mm: f64,
     /// Where the first pixel of each slice lies, in new voxels.
     offsets: Vec<DVec2>,
 }
@@ -58,28 +63,57 @@ impl Plan {
             lps_from_voxel: DAffine3::from_cols(x * spacing.x, y * spacing.y, x.cross(y) * step, origin),
             old_size: first.stored.size,
             heights: stack.heights.iter().map(|height| height / step).collect(),
+            step_mm: step,
             offsets: offsets.iter().map(|&offset| offset - low).collect(),
         }
+    }
+}
+
+impl Plan {
+    /// Whether a plane is one of the slices.
+    fn is_on_slice(&self, z: usize) -> bool {
+        let next = self.heights.partition_point(|&height| height < z as f64 - ON_SLICE);
+        self.heights.get(next).is_some_and(|height| height - z as f64 <= ON_SLICE)
+    }
+
+    /// The largest distance between slices, over which values had to be made up.
+    fn widest_gap_mm(&self) -> f64 {
+        self.heights.windows(2).map(|pair| (pair[1] - pair[0]) * self.step_mm).fold(0.0, f64::max)
     }
 }
 
 /// Fills `new`, which has the plan's shape, from numbers and their scaling.
 pub(super) fn resample<T: Number>(
     (old, scaling): (&[T], (f64, f64)),
-    plan: &Plan,
+    (plan, irregularity): (&Plan, &Irregularity),
     new: &mut [T],
     report: &mut Report,
 ) {
     let [nx, ny, nz] = plan.shape;
     let sampler = Sampler { old, plan, between: Between::of(old, scaling) };
-    new.par_chunks_mut(nx * ny).enumerate().for_each(|(z, plane)| sampler.fill_plane(z, plane));
+    let planes = new.par_chunks_mut(nx * ny).enumerate();
+    let n_outside: usize = planes.map(|(z, plane)| sampler.fill_plane(z, plane)).sum();
+    let n_between = (0..nz).filter(|&z| !plan.is_on_slice(z)).count();
+    report.count_usize("dicom_planes", nz);
+    report.count_usize("dicom_planes_between_slices", n_between);
+    report.count("dicom_widest_gap_mm", plan.widest_gap_mm());
+    report.count_usize("dicom_voxels_outside_slices", n_outside);
+    if let Some((degrees, _)) = irregularity.tilt {
+        report.count("dicom_tilt_deg", degrees);
+    }
+    let n_missing = irregularity.missing.iter().map(|(n_missing, ..)| n_missing).sum();
+    report.count_usize("dicom_missing_slices", n_missing);
     let [ox, oy] = plan.old_size;
     let how = sampler.between.words();
     let n_slices = plan.heights.len();
     report.warn(
         "W-DICOM-RESAMPLED",
         format!(
-            "{n_slices} slices of {ox}x{oy} were resampled to {nx}x{ny}x{nz} even orthogonal voxels by {how}"
+            "{irregularity}: {n_slices} slices of {ox}x{oy} were resampled to {nx}x{ny}x{nz} even orthogonal voxels by \
+             {how}; {n_between} of {nz} planes lie between slices, up to {:.2} mm apart, and {:.1} % of the voxels \
+             outside of them",
+            plan.widest_gap_mm(),
+            100.0 * n_outside as f64 / (nx * ny * nz) as f64
         ),
     );
 }
@@ -91,34 +125,40 @@ struct Sampler<'a, T> {
 }
 
 impl<T: Number> Sampler<'_, T> {
-    fn fill_plane(&self, z: usize, plane: &mut [T]) {
+    /// Fills a plane; tells how many of its voxels lie outside the slices.
+    fn fill_plane(&self, z: usize, plane: &mut [T]) -> usize {
         let heights = &self.plan.heights;
         let here = z as f64;
         // The slice at or below the plane, and the share of the one above.
         let below = heights.partition_point(|&height| height <= here + 1e-9).clamp(1, heights.len() - 1) - 1;
         let share = ((here - heights[below]) / (heights[below + 1] - heights[below])).clamp(0.0, 1.0);
         let [nx, _, _] = self.plan.shape;
+        let mut n_outside = 0;
         for (index, voxel) in plane.iter_mut().enumerate() {
             let point = DVec2::new((index % nx) as f64, (index / nx) as f64);
-            *voxel = if self.between.policy == Policy::Labels {
-                self.nearest(below + usize::from(share >= 0.5), point).unwrap_or(self.between.fill)
+            let value = if self.between.policy == Policy::Labels {
+                self.nearest(below + usize::from(share >= 0.5), point)
             } else {
                 self.blend(below, share, point)
             };
+            n_outside += usize::from(value.is_none());
+            *voxel = value.unwrap_or(self.between.fill);
         }
+        n_outside
     }
 
     /// Where only one slice reaches, the nearer of the two decides.
-    fn blend(&self, below: usize, share: f64, point: DVec2) -> T {
+    fn blend(&self, below: usize, share: f64, point: DVec2) -> Option<T> {
         // A slice without weight is not looked at, so that a plane on a slice is that slice.
         let lower = if share < 1.0 { self.bilinear(below, point) } else { None };
         let upper = if share > 0.0 { self.bilinear(below + 1, point) } else { None };
-        match (lower, upper) {
-            (Some(a), Some(b)) => self.between.settle(a + share * (b - a)),
-            (Some(a), None) if share < 0.5 => self.between.settle(a),
-            (None, Some(b)) if share >= 0.5 => self.between.settle(b),
-            _ => self.between.fill,
-        }
+        let value = match (lower, upper) {
+            (Some(a), Some(b)) => a + share * (b - a),
+            (Some(a), None) if share < 0.5 => a,
+            (None, Some(b)) if share >= 0.5 => b,
+            _ => return None,
+        };
+        Some(self.between.settle(value))
     }
 
     fn bilinear(&self, slice: usize, point: DVec2) -> Option<f64> {

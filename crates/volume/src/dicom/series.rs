@@ -11,6 +11,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 use espalier_model::Report;
 use rayon::prelude::*;
@@ -126,8 +127,9 @@ pub(super) fn list_files(folder: &Path, is_deep: bool) -> Result<Vec<PathBuf>, R
 }
 
 fn inspect_all(files: &[PathBuf], options: &ReadOptions) -> Result<Contents, ReadError> {
+    let gate = Mutex::new(());
     let found: Vec<std::io::Result<Found>> =
-        files.par_iter().map(|file| inspect(file, options.max_bytes)).collect();
+        files.par_iter().map(|file| inspect(file, options.max_bytes, &gate)).collect();
     let mut contents = Contents { n_files: files.len(), ..Contents::default() };
     let mut of_series: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     for found in found {

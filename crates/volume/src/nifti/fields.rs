@@ -7,6 +7,7 @@
 //! **Differs from the source** the bytes of NIfTI-1 are taken apart by the crate `nifti`, those of NIfTI-2, which it
 //! does not know, here.
 
+use espalier_model::bytes::from_lowest;
 use nifti::NiftiHeader;
 
 use crate::ReadError;
@@ -80,8 +81,7 @@ fn version_1(source: &mut Source, is_big_endian: bool) -> Result<Fields, ReadErr
         .map_err(|_| not_nifti("a NIfTI header that cannot be taken apart"))?;
     // The struct's reader guesses the byte order from dim[0], so a bad dim[0] shows in sizeof_hdr.
     if header.sizeof_hdr != N_BYTES_1 as i32 {
-        let raw = [bytes[40], bytes[41]];
-        let found = if is_big_endian { i16::from_be_bytes(raw) } else { i16::from_le_bytes(raw) };
+        let found = i16::from_le_bytes(from_lowest([bytes[40], bytes[41]], is_big_endian));
         return Err(ReadError::Field { field: "dim[0]", found: found.to_string(), expected: "1 to 7" });
     }
     let row = |srow: [f32; 4]| srow.map(f64::from);
@@ -151,10 +151,7 @@ impl Reader<'_> {
     fn little<const N: usize>(&self, offset: usize) -> [u8; N] {
         let mut number = [0_u8; N];
         number.copy_from_slice(&self.bytes[offset..offset + N]);
-        if self.is_big_endian {
-            number.reverse();
-        }
-        number
+        from_lowest(number, self.is_big_endian)
     }
 
     fn i16(&self, offset: usize) -> i16 {

@@ -15,6 +15,7 @@ use espalier_model::Report;
 use header::{Encoding, Header};
 
 use crate::ascii::AsciiStream;
+use crate::read::check_limit;
 use crate::source::Source;
 use crate::stored::{self, FileStream, Interleaved, Stored, VoxelStream};
 use crate::text::Lines;
@@ -31,7 +32,7 @@ pub(crate) fn open(
     drop(source);
     let axes = axes::in_space(&header)?;
     let index = stored::volume_index(axes.n_inner.saturating_mul(axes.n_outer), options)?;
-    let data = open_data(path, &header, &axes)?;
+    let data = open_data(path, &header, &axes, options)?;
     let (world_from_voxel, form) = axes::world_from_voxel(&header, &axes, options, report)?;
     Ok(Stored {
         shape: axes.shape,
@@ -47,7 +48,7 @@ pub(crate) fn open(
 }
 
 /// The stream of the data of all volumes, at its first byte, large enough as far as can be told.
-fn open_data(path: &Path, header: &Header, axes: &Axes) -> Result<Source, ReadError> {
+fn open_data(path: &Path, header: &Header, axes: &Axes, options: &ReadOptions) -> Result<Source, ReadError> {
     let mut source = at_data(path, header)?;
     if header.encoding == Encoding::Ascii {
         return Ok(source);
@@ -55,7 +56,10 @@ fn open_data(path: &Path, header: &Header, axes: &Axes) -> Result<Source, ReadEr
     let n_before = match u64::try_from(header.byte_skip) {
         Ok(n_bytes) => n_bytes,
         Err(_) => {
-            // What stands before the data is what its length leaves of the stream.
+            // What stands before the data is what its length leaves of the stream. To know that length a compressed one
+            // is read through, but only if the data can be in it and one volume of it may be held.
+            source.expect(source.position().saturating_add(axes.data_bytes))?;
+            check_limit(axes.volume_bytes, options)?;
             let n_all = if source.is_compressed() {
                 at_data(path, header)?.drain(axes.data_bytes.saturating_add(stored::MAX_TRAILING_BYTES))?
             } else {
