@@ -353,7 +353,12 @@ fn compared(judged: &Judged) -> ComparedLayout {
         evaluations: judged.evaluations,
         targets: judged.targets,
     };
-    ComparedLayout { row, quantum_mm: judged.posed.quantum_mm, positions_mm: judged.posed.positions.clone() }
+    ComparedLayout {
+        row,
+        quantum_mm: judged.posed.quantum_mm,
+        positions_mm: judged.posed.positions.clone(),
+        trace: judged.trace.clone(),
+    }
 }
 
 fn report(problem: &Problem, judged: &[Judged], winner: &Judged, params: &Params) -> Report {

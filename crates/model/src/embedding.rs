@@ -136,9 +136,40 @@ pub enum Termination {
     BudgetSpent,
 }
 
-/// One point of the convergence curve.
+/// What a method had just done when a point of its convergence curve was taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Nothing: the layout that it begins with.
+    Start,
+    /// The targets bent until they do not cross.
+    Untangling,
+    /// A few ratios at a time towards 0.
+    Descent,
+    /// All ratios at once under a barrier.
+    Barrier,
+    /// An iteration of the swarm.
+    Swarm,
+}
+
+impl Phase {
+    /// The name in tables and figures.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Start => "start",
+            Self::Untangling => "untangling",
+            Self::Descent => "descent",
+            Self::Barrier => "barrier",
+            Self::Swarm => "swarm",
+        }
+    }
+}
+
+/// One point of a convergence curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TracePoint {
+    /// What has just been done.
+    pub phase: Phase,
     /// The iteration; 0 is the start.
     pub iteration: u32,
     /// Evaluations of the energy so far.

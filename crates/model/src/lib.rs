@@ -53,8 +53,8 @@ pub use diagnose::Diagnose;
 pub use edits::{Edit, EditError, Edits};
 pub use embedding::{
     Better, Certificate, CompareCell, CompareColumn, ComparedLayout, ComparedRun, ComparedRuns, Comparison,
-    EditRecord, Embedding, Energy, LossColumn, Losses, MethodRow, NODE_COLUMNS, Pose, RUN_COLUMN, TargetKind,
-    Targets, Termination, TracePoint, WidthMode, Widths, compare_columns,
+    EditRecord, Embedding, Energy, LossColumn, Losses, MethodRow, NODE_COLUMNS, Phase, Pose, RUN_COLUMN,
+    TargetKind, Targets, Termination, TracePoint, WidthMode, Widths, compare_columns,
 };
 pub use grid::{Grid, GridError, RAS_FROM_LPS};
 pub use ledger::{LEDGER_COLUMNS, Ledger, LedgerEntry, LedgerKind};

@@ -141,6 +141,8 @@ impl Stage {
                 "/global-view.png",
                 "/compare.png",
                 "/compare.svg",
+                "/convergence.png",
+                "/convergence.svg",
             ],
         };
         let folder = self.folder();

@@ -8,7 +8,7 @@ use espalier_embed::PoseMode;
 use espalier_model::table::{Column, Table, fixed};
 use espalier_model::{
     Comparison, Embedding, Grid, GridError, InscribedSpheres, Ledger, LedgerKind, Mask, MethodRow, Report,
-    Termination, Tree, ViewHierarchy, nifti_out, swc,
+    Termination, TracePoint, Tree, ViewHierarchy, nifti_out, swc,
 };
 
 use crate::artifacts::{Artifacts, Lookup, SOURCE_KEY, SOURCE_SCAN, SOURCE_TRACING};
@@ -248,7 +248,7 @@ fn embed(step: &mut Step<'_>) -> Result<Outcome, Error> {
         ("nodes.tsv".to_owned(), embedding.nodes_tsv(&tree).into_bytes()),
         ("compare.tsv".to_owned(), MethodRow::to_tsv(&embedding.methods).into_bytes()),
         ("dictionary.tsv".to_owned(), dictionary::text().into_bytes()),
-        step.beside("convergence.tsv", convergence_tsv(&embedding).into_bytes()),
+        step.beside("convergence.tsv", convergence_tsv(&embedded.comparison).into_bytes()),
         step.place(Artifact::Embedding, json.into_bytes()),
         step.place(Artifact::Comparison, compared_json.into_bytes()),
     ];
@@ -280,6 +280,7 @@ fn render(step: &mut Step<'_>) -> Result<Outcome, Error> {
         let subject =
             figure::Subject { name: None, tree: &tree, views: &views, comparison: &comparison, compass };
         files.extend(figure::draw(&[subject], &params).map_err(|error| step.failed(error))?);
+        files.extend(figure::convergence(&comparison, &params).map_err(|error| step.failed(error))?);
     }
     let line = files.iter().map(|(file, _)| file.as_str()).collect::<Vec<_>>().join(", ");
     Ok(Outcome { files, report: made.report, line })
@@ -409,18 +410,37 @@ fn embedding_phrase(embedding: &Embedding) -> String {
 }
 
 /// The columns of `convergence.tsv`.
-pub(crate) const CONVERGENCE_COLUMNS: [Column; 4] = [
-    Column::new("iteration", "1", "iteration of the optimiser; 0 is the start"),
-    Column::new("evaluations", "1", "evaluations of the energy so far"),
+pub(crate) const CONVERGENCE_COLUMNS: [Column; 7] = [
+    Column::new("method", "n/a", "the method, as in compare.tsv"),
+    Column::new("targets", "n/a", "the targets that it was scored against"),
+    Column::new("phase", "n/a", "what had just been done"),
+    Column::new("iteration", "1", "iteration of the method; 0 is the start"),
+    Column::new(
+        "evaluations",
+        "1",
+        "work so far: evaluations of a particle for a swarm, edges looked at for the solver",
+    ),
     Column::new("energy", "1", "the best energy so far"),
     Column::new("crossings", "pairs", "the crossings of that best"),
 ];
 
-/// The convergence curve: best energy and its crossings by iteration.
-fn convergence_tsv(embedding: &Embedding) -> String {
+/// The convergence curves of the methods that search: the best energy so far and its crossings.
+fn convergence_tsv(comparison: &Comparison) -> String {
     let mut table = Table::with(&CONVERGENCE_COLUMNS);
-    for point in &embedding.trace {
-        table.row(&[&point.iteration, &point.evaluations, &fixed(point.energy, 9), &point.crossings]);
+    for layout in &comparison.layouts {
+        for point in &layout.trace {
+            let TracePoint { phase, iteration, evaluations, energy, crossings } = point;
+            let (method, targets) = (&layout.row.method, layout.row.targets.name());
+            table.row(&[
+                method,
+                &targets,
+                &phase.name(),
+                iteration,
+                evaluations,
+                &fixed(*energy, 9),
+                crossings,
+            ]);
+        }
     }
     table.into_string()
 }

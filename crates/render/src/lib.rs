@@ -9,7 +9,7 @@
 //! | 5 | `sketch`, `cone`, `kinship` | edges as round cones in pixels |
 //! | 6 | `raster`, `samples`, `shade` | the pixels |
 //! | 7 | `paint`, `svg`, `outline`, `layers` | the files |
-//! | 8 | `side_by_side`, `tiling`, `parts`; `chart` | several layouts in one figure; charts of numbers |
+//! | 8 | `side_by_side`, `tiling`, `parts`; `chart`, `convergence` | several layouts in one figure; charts of numbers |
 //!
 //! **Source** section 4.1 of [Hu2022].
 
@@ -42,6 +42,7 @@ mod paint;
 mod svg;
 
 mod chart;
+mod convergence;
 mod parts;
 mod side_by_side;
 mod tiling;
@@ -53,6 +54,7 @@ use glam::DVec3;
 
 pub use chart::{Chart, Charts, charts};
 use coloring::Coloring;
+pub use convergence::{Searched, convergence};
 pub use error::Error;
 use furniture::Heading;
 use kinship::Kinship;

@@ -13,12 +13,15 @@ use crate::flat::{Flat, mirrored};
 use crate::layout::Claim;
 use crate::losses::losses;
 use crate::overlaps;
+use crate::pose::fault_of_trace;
 use crate::ratios;
 use crate::sweep::meetings;
 use crate::weights::NodeWeights;
 
 /// Share by which an energy may be off.
 const ROUNDING: f64 = 1e-9;
+/// The same of the end of a convergence curve, which was taken before coordinates were rounded.
+const TRACE_ROUNDING: f64 = 1e-6;
 
 /// Checks every layout of a comparison.
 ///
@@ -83,12 +86,30 @@ impl Compared<'_> {
         if overlaps.is_complete && !is_within {
             return Some(format!("{} overlaps", overlaps.certain));
         }
+        if let Some(fault) = self.fault_of_trace() {
+            return Some(fault);
+        }
         if self.has_other_targets() {
             return None;
         }
         let (as_is, mirrored) =
             (self.fault_of_image(positions_mm), self.fault_of_image(&mirrored(positions_mm)));
         as_is.and(mirrored)
+    }
+
+    /// A curve in no order, or one that ends elsewhere than the row says.
+    fn fault_of_trace(&self) -> Option<String> {
+        let ComparedLayout { row, trace, .. } = self.layout;
+        let last = trace.last()?;
+        let (stated, found) = (row.energy.total(), last.energy);
+        let is_end = (stated - found).abs() <= TRACE_ROUNDING * stated.abs().max(1.0);
+        let other_end = || format!("convergence that ends at the energy {found:.9}, stated {stated:.9}");
+        let more =
+            || format!("convergence over {} evaluations, stated {}", last.evaluations, row.evaluations);
+        fault_of_trace(trace)
+            .map(|fault| format!("convergence: {fault}"))
+            .or_else(|| (!is_end).then(other_end))
+            .or_else(|| (last.evaluations > row.evaluations).then(more))
     }
 
     /// The first number that one of the two mirror images does not have.

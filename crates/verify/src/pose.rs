@@ -10,7 +10,7 @@
 //! evaluations do not fall and its energies do not rise.
 
 use espalier_geom::math;
-use espalier_model::{Embedding, Tree, WidthMode};
+use espalier_model::{Embedding, TracePoint, Tree, WidthMode};
 use glam::DVec2;
 
 use crate::check::Check;
@@ -46,14 +46,18 @@ pub(crate) fn check_pose(tree: &Tree, embedding: &Embedding) -> Vec<Check> {
 
 /// Checks the convergence curve.
 pub(crate) fn check_trace(embedding: &Embedding) -> Check {
-    let worse = |pair: &[espalier_model::TracePoint]| {
+    Check::unless("trace", format!("{} points", embedding.trace.len()), fault_of_trace(&embedding.trace))
+}
+
+/// What is wrong with a convergence curve: iterations and work go up, the energy never does.
+pub(crate) fn fault_of_trace(trace: &[TracePoint]) -> Option<String> {
+    let worse = |pair: &[TracePoint]| {
         let (a, b) = (pair[0], pair[1]);
         let rises = b.energy > a.energy + ROUNDING * a.energy.abs();
         b.iteration <= a.iteration || b.evaluations < a.evaluations || rises
     };
-    let broken = embedding.trace.windows(2).position(worse);
-    let fault = broken.map(|idx| format!("points {idx} and {} are in no order", idx + 1));
-    Check::unless("trace", format!("{} points", embedding.trace.len()), fault)
+    let broken = trace.windows(2).position(worse);
+    broken.map(|idx| format!("points {idx} and {} are in no order", idx + 1))
 }
 
 /// A and A', and all weights.

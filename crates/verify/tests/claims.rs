@@ -5,7 +5,7 @@
 mod common;
 
 use espalier_embed::{Method, Params, PsoParams, TargetMode, WeightRule, embed};
-use espalier_model::{Embedding, Termination, TracePoint, Tree, ViewHierarchy};
+use espalier_model::{Embedding, Phase, Termination, TracePoint, Tree, ViewHierarchy};
 use espalier_verify::{
     Claim, Outcome, Rule, Weights, check_compare_table, check_embedding, check_nodes_table,
 };
@@ -141,7 +141,13 @@ fn each_change_is_found_where_it_is() {
         // A sum of rounded numbers is not always one.
         ("pose: root", |e| e.positions_mm.iter_mut().for_each(|p| p.x = rounded(p.x + 1.0))),
         ("trace", |e| {
-            let point = |iteration, energy| TracePoint { iteration, evaluations: 1, energy, crossings: 0 };
+            let point = |iteration, energy| TracePoint {
+                phase: Phase::Swarm,
+                iteration,
+                evaluations: 1,
+                energy,
+                crossings: 0,
+            };
             e.trace = vec![point(0, 1.0), point(1, 2.0)];
         }),
         ("widths: overlaps", |e| e.widths.overlaps += 1),

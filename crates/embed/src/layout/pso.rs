@@ -12,7 +12,7 @@
 //! **Cost** particles · iterations evaluations at most, 24 bytes per particle and ratio.
 
 use espalier_geom::random::{Purpose, Stream};
-use espalier_model::{Termination, TracePoint};
+use espalier_model::{Phase, Termination, TracePoint};
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -133,6 +133,7 @@ fn targets_met(
 ) -> Layout {
     let score = energy.evaluate_one(targets, f64::INFINITY, &mut Scratch::default());
     let point = TracePoint {
+        phase: Phase::Start,
         iteration: 0,
         evaluations: 1,
         energy: score.map_or(0.0, |score| score.energy),
@@ -245,7 +246,8 @@ impl Swarm {
 
     fn record(&mut self, iteration: u32, params: &PsoParams, progress: &(dyn Fn(Progress) + Sync)) {
         let Score { energy, crossings } = self.global_score;
-        let point = TracePoint { iteration, evaluations: self.evaluations, energy, crossings };
+        let phase = if iteration == 0 { Phase::Start } else { Phase::Swarm };
+        let point = TracePoint { phase, iteration, evaluations: self.evaluations, energy, crossings };
         report(&point, params, progress);
         self.trace.push(point);
     }

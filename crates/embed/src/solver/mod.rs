@@ -41,7 +41,7 @@ mod similarity;
 mod untangling;
 mod work;
 
-use espalier_model::{Termination, TracePoint};
+use espalier_model::{Phase, Termination, TracePoint};
 
 use crate::energy;
 use crate::layout::{Aim, Layout};
@@ -74,25 +74,27 @@ pub(crate) fn layout(problem: &Problem, cone: &[f64], params: &Params) -> Layout
     let prospect = Prospect::of(problem);
     if prospect == Prospect::Free {
         let mut run = Run::new(problem, &params.solver, targets);
-        run.record();
+        run.record(Phase::Start);
         return run.end();
     }
     let cone = Shape::from_headings(problem, cone);
     if prospect == Prospect::Crowded {
         let mut run = Run::new(problem, &params.solver, cone);
         run.work.limit = run.work.limit.min((params.solver.effort * CROWDED_WORK) as u64);
-        run.record();
+        run.record(Phase::Start);
         run.descend(&separation, 1.0);
         return run.end();
     }
     let from_cone = || {
         let mut run = Run::new(problem, &params.solver, cone.clone());
+        run.record(Phase::Start);
         run.improve(&separation);
         run
     };
     let from_targets = || {
         let mut run = Run::new(problem, &params.solver, cone.clone());
         run.untangle(&separation);
+        run.record(Phase::Untangling);
         run.improve(&separation);
         run
     };
@@ -129,7 +131,6 @@ impl<'a> Run<'a> {
 
     /// Descends; then barrier and descent in turn, as long as it pays. What has no loss is left as it is.
     fn improve(&mut self, separation: &Separation) {
-        self.record();
         if self.is_lossless() {
             return;
         }
@@ -137,7 +138,7 @@ impl<'a> Run<'a> {
         let mut is_first = true;
         while self.params.barrier && !self.problem.is_thread() && !self.work.is_spent() {
             let before = self.energy();
-            self.keep_if_better(|run| {
+            self.keep_if_better(Phase::Barrier, |run| {
                 barrier::relax(run.problem, separation, &mut run.shape, (is_first, &mut run.work));
             });
             is_first = false;
@@ -151,7 +152,7 @@ impl<'a> Run<'a> {
     /// Descends with a share of the work.
     fn descend(&mut self, separation: &Separation, share: f64) {
         if self.params.descent {
-            self.keep_if_better(|run| {
+            self.keep_if_better(Phase::Descent, |run| {
                 let mut slice = run.work.slice(share);
                 descent::descend(run.problem, separation, &mut run.shape, &mut slice);
                 run.work.add(slice);
@@ -159,13 +160,13 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn keep_if_better(&mut self, step: impl FnOnce(&mut Self)) {
+    fn keep_if_better(&mut self, phase: Phase, step: impl FnOnce(&mut Self)) {
         let (kept, before) = (self.shape.clone(), self.energy());
         step(self);
         if self.energy() >= before {
             self.shape = kept;
         }
-        self.record();
+        self.record(phase);
     }
 
     /// Whether all ratios are zero, so that nothing can be better but the placement.
@@ -183,8 +184,9 @@ impl<'a> Run<'a> {
         energy::score(self.problem, &self.shape.positions(self.problem), 0.0, 0).energy.total()
     }
 
-    fn record(&mut self) {
+    fn record(&mut self, phase: Phase) {
         self.trace.push(TracePoint {
+            phase,
             iteration: self.trace.len() as u32,
             evaluations: self.work.done,
             energy: self.energy(),

@@ -7,15 +7,16 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::file::{self, MethodRowFile};
+use super::file::{self, MethodRowFile, TracePointFile};
 use super::losses::{Better, Losses};
-use super::{MethodRow, TargetKind};
+use super::{MethodRow, TargetKind, TracePoint};
 use crate::table::{Column, Digits, Table};
 use crate::tree::Tree;
 use crate::versioned::{self, FileError};
 
 const FORMAT: &str = "espalier-compare";
-const VERSION: u32 = 1;
+/// 2: the convergence curve of every method.
+const VERSION: u32 = 2;
 
 /// The layouts of all methods of a run, scored alike.
 ///
@@ -44,6 +45,8 @@ pub struct ComparedLayout {
     pub quantum_mm: f64,
     /// Where each node lies, plane mm: x to the right, y up.
     pub positions_mm: Vec<DVec2>,
+    /// Its convergence curve, best so far; empty for a method that does not search.
+    pub trace: Vec<TracePoint>,
 }
 
 /// A cell of `compare.tsv`.
@@ -215,6 +218,7 @@ struct ComparisonFile {
 struct ComparedLayoutFile {
     row: MethodRowFile,
     quantum_mm: f64,
+    trace: Vec<TracePointFile>,
     positions_mm: Vec<[f64; 2]>,
 }
 
@@ -225,6 +229,7 @@ impl Comparison {
         let layout = |layout: &ComparedLayout| ComparedLayoutFile {
             row: (&layout.row).into(),
             quantum_mm: layout.quantum_mm,
+            trace: layout.trace.iter().copied().map(Into::into).collect(),
             positions_mm: layout.positions_mm.iter().map(DVec2::to_array).collect(),
         };
         let file = ComparisonFile {
@@ -249,6 +254,7 @@ impl Comparison {
             row: layout.row.into(),
             quantum_mm: layout.quantum_mm,
             positions_mm: layout.positions_mm.into_iter().map(DVec2::from_array).collect(),
+            trace: layout.trace.into_iter().map(Into::into).collect(),
         };
         Ok(Self {
             tree: file.tree,
@@ -276,7 +282,7 @@ mod tests {
 
     use super::*;
     use crate::tree::Node;
-    use crate::{Energy, Targets};
+    use crate::{Energy, Phase, Targets};
 
     fn sample() -> (Tree, Comparison) {
         let node = |x, parent| Node { position_mm: DVec3::new(x, 0.0, 0.0), radius_mm: 1.0, parent, kind: 0 };
@@ -294,6 +300,13 @@ mod tests {
             row: row(method, x / 7.0),
             quantum_mm: 1e-4,
             positions_mm: vec![DVec2::ZERO, DVec2::new(x, 0.0)],
+            trace: vec![TracePoint {
+                phase: Phase::Swarm,
+                iteration: 1,
+                evaluations: 7,
+                energy: x,
+                crossings: 2,
+            }],
         };
         let layouts = vec![layout("radial", 0.333_3), layout("solver", 0.5)];
         let comparison =

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::losses::LossesFile;
 use super::{
-    Certificate, EditRecord, Embedding, Energy, MethodRow, Pose, TargetKind, Targets, Termination,
+    Certificate, EditRecord, Embedding, Energy, MethodRow, Phase, Pose, TargetKind, Targets, Termination,
     TracePoint, WidthMode, Widths,
 };
 use crate::edits::Edit;
@@ -17,8 +17,8 @@ use crate::tree::Tree;
 use crate::versioned::{self, FileError};
 
 const FORMAT: &str = "espalier-embedding";
-/// 2: more losses, manual edits, widths.
-const VERSION: u32 = 2;
+/// 2: more losses, manual edits, widths. 3: phases of the convergence curve.
+const VERSION: u32 = 3;
 
 /// The columns of `nodes.tsv`.
 pub const NODE_COLUMNS: [Column; 13] = [
@@ -221,9 +221,20 @@ struct PoseFile {
     is_reflected: bool,
 }
 
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum PhaseFile {
+    Start,
+    Untangling,
+    Descent,
+    Barrier,
+    Swarm,
+}
+
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct TracePointFile {
+pub(super) struct TracePointFile {
+    phase: PhaseFile,
     iteration: u32,
     evaluations: u64,
     energy: f64,
@@ -516,7 +527,22 @@ macro_rules! same_variants {
 }
 
 same_fields!(Energy, EnergyFile { length, angle, side, placement, crossing });
-same_fields!(TracePoint, TracePointFile { iteration, evaluations, energy, crossings });
+
+impl From<TracePoint> for TracePointFile {
+    fn from(point: TracePoint) -> Self {
+        let TracePoint { phase, iteration, evaluations, energy, crossings } = point;
+        Self { phase: phase.into(), iteration, evaluations, energy, crossings }
+    }
+}
+
+impl From<TracePointFile> for TracePoint {
+    fn from(point: TracePointFile) -> Self {
+        let TracePointFile { phase, iteration, evaluations, energy, crossings } = point;
+        Self { phase: phase.into(), iteration, evaluations, energy, crossings }
+    }
+}
+
+same_variants!(Phase, PhaseFile { Start, Untangling, Descent, Barrier, Swarm });
 same_variants!(TargetKind, TargetKindFile { Intrinsic, Projected, IntrinsicMirrored, ProjectedMirrored });
 same_variants!(WidthMode, WidthModeFile { Report, Avoid, Stretch });
 same_variants!(Termination, TerminationFile { Constructed, Optimal, Converged, BudgetSpent });
@@ -571,7 +597,13 @@ mod tests {
             },
             pose: Pose { rotation_rad: 0.3, is_reflected: false },
             termination: Termination::BudgetSpent,
-            trace: vec![TracePoint { iteration: 0, evaluations: 1, energy: 0.3, crossings: 0 }],
+            trace: vec![TracePoint {
+                phase: Phase::Descent,
+                iteration: 0,
+                evaluations: 1,
+                energy: 0.3,
+                crossings: 0,
+            }],
             methods: vec![row],
             edits: vec![EditRecord {
                 edit: Edit { branch: 0, node: 0, angle_deg: 1.0 / 3.0 },

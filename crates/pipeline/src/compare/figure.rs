@@ -1,9 +1,9 @@
-//! The figure of a comparison: `compare.png` and `compare.svg`.
+//! The figures of a comparison: `compare.png` and `compare.svg`, `convergence.png` and `convergence.svg`.
 //!
 //! Where the table says that edges cross, the pairs are found from the coordinates. `verify` counts all of them again.
 
 use espalier_model::{Comparison, Tree, ViewHierarchy};
-use espalier_render::{Compass, Error, Panel, Params, Section};
+use espalier_render::{Compass, Error, Panel, Params, Searched, Section};
 
 /// The most crossings that are marked in a panel.
 const MOST_RINGS: usize = 5000;
@@ -23,6 +23,25 @@ pub(crate) fn draw(subjects: &[Subject<'_>], params: &Params) -> Result<Vec<(Str
     let sections: Vec<Section<'_>> = subjects.iter().map(section).collect();
     let figure = espalier_render::side_by_side(&sections, params)?;
     Ok(vec![("compare.png".to_owned(), figure.png), ("compare.svg".to_owned(), figure.svg.into_bytes())])
+}
+
+/// Draws the energy of a run's methods against their work; gives the files.
+pub(crate) fn convergence(comparison: &Comparison, params: &Params) -> Result<Vec<(String, Vec<u8>)>, Error> {
+    let methods: Vec<Searched<'_>> = comparison
+        .layouts
+        .iter()
+        .enumerate()
+        .map(|(idx, layout)| Searched {
+            row: &layout.row,
+            trace: &layout.trace,
+            is_chosen: idx == comparison.chosen,
+        })
+        .collect();
+    let figure = espalier_render::convergence(&methods, params)?;
+    Ok(vec![
+        ("convergence.png".to_owned(), figure.png),
+        ("convergence.svg".to_owned(), figure.svg.into_bytes()),
+    ])
 }
 
 fn section<'a>(subject: &Subject<'a>) -> Section<'a> {
