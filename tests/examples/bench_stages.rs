@@ -138,7 +138,7 @@ fn clean(mask: Mask) -> Outcome<Mask> {
 }
 
 fn thin(mask: &Mask, thinning: Thinning) -> Outcome<Skeleton> {
-    let params = espalier_skeleton::Params { thinning, ..espalier_skeleton::Params::default() };
+    let params = espalier_skeleton::Params { thinning };
     Ok(espalier_skeleton::skeletonize(mask, &params)?.skeleton)
 }
 

@@ -1,5 +1,7 @@
 //! The voxel grid of a volume and its place in the world.
 
+use std::cmp::Ordering;
+
 use glam::{DAffine3, DVec3};
 use thiserror::Error;
 
@@ -62,6 +64,9 @@ impl Diagnose for GridError {
 
 /// The largest cosine between two voxel axes that still counts as orthogonal.
 pub(crate) const MAX_SHEAR: f64 = 1e-3;
+
+/// Sums of three cosines that differ by less are the same: far above rounding, far below what turns a scan.
+const SAME_ALIGNMENT: f64 = 1e-9;
 
 impl Grid {
     /// A grid of `shape` (x, y, z) voxels whose centres `world_from_voxel` maps to RAS+ mm.
@@ -166,22 +171,28 @@ impl Grid {
 
     /// For each voxel axis, the world axis (0 = R, 1 = A, 2 = S) it is nearest to, and whether it points along
     /// it (`true`) or against it. A permutation of the three axes.
+    ///
+    /// Axes half-way between two of the world's go to either, but to the same one in whatever order they are stored.
     #[must_use]
     pub fn nearest_world_axes(&self) -> [(usize, bool); 3] {
         let columns = self.world_from_voxel.matrix3.to_cols_array_2d();
         const PERMUTATIONS: [[usize; 3]; 6] =
             [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
         let spacing = self.spacing_mm().to_array();
-        let alignment = |permutation: &[usize; 3]| -> f64 {
-            (0..3).map(|axis| (columns[axis][permutation[axis]] / spacing[axis]).abs()).sum()
-        };
-        let mut best = PERMUTATIONS[0];
-        for permutation in PERMUTATIONS {
-            if alignment(&permutation) > alignment(&best) + 1e-12 {
-                best = permutation;
+        let ways = PERMUTATIONS.map(|permutation| {
+            let nearest = [0, 1, 2].map(|axis| (permutation[axis], columns[axis][permutation[axis]] > 0.0));
+            // The cosines and the axes turned this way, by world axis.
+            let (mut cosines, mut turned) = ([0.0; 3], [[0.0; 3]; 3]);
+            for (axis, (world, is_along)) in nearest.into_iter().enumerate() {
+                cosines[world] = (columns[axis][world] / spacing[axis]).abs();
+                turned[world] = columns[axis].map(|value| if is_along { value } else { -value });
             }
-        }
-        [0, 1, 2].map(|axis| (best[axis], columns[axis][best[axis]] > 0.0))
+            (cosines[0] + cosines[1] + cosines[2], turned, nearest)
+        });
+        let most = ways.iter().map(|way| way.0).fold(0.0, f64::max);
+        let best = ways.iter().filter(|way| way.0 >= most - SAME_ALIGNMENT);
+        let chosen = best.max_by(|a, b| a.1.partial_cmp(&b.1).unwrap_or(Ordering::Equal));
+        chosen.map_or([(0, true), (1, true), (2, true)], |way| way.2)
     }
 
     /// The orientation as three letters, such as `LPS`: where x, y and z point.

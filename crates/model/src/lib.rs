@@ -41,6 +41,7 @@ mod spheres;
 pub mod swc;
 pub mod table;
 mod tree;
+mod turn;
 mod versioned;
 mod views;
 mod volume;

@@ -13,6 +13,7 @@ use espalier_model::{
 };
 use espalier_model::{label_table, polydata};
 use espalier_tree::LabelMap;
+use espalier_volume::Orientation;
 
 use crate::config::{Input, Unit};
 use crate::error::Error;
@@ -36,6 +37,8 @@ pub(crate) struct Artifacts {
     /// Files that the config names beside the input.
     pub(crate) side_paths: BTreeMap<SideFile, PathBuf>,
     pub(crate) read_options: espalier_volume::ReadOptions,
+    /// The axis order of masks and skeletons, also of those that the user names.
+    pub(crate) orientation: Orientation,
     /// How a traced tree is scaled.
     pub(crate) input: Input,
     /// Whether neither the user nor the traced tree's file has said what its unit is.
@@ -133,8 +136,9 @@ impl Artifacts {
         }
         let path = self.locate(Artifact::Mask, lookup)?;
         let volume = self.read_volume(&path, lookup.stage)?.volume;
-        let mask =
-            Arc::new(Mask::from_voxels(volume.grid().clone(), &volume.map_values(|value| value != 0.0)));
+        let mask = Mask::from_voxels(volume.grid().clone(), &volume.map_values(|value| value != 0.0));
+        let mask = espalier_volume::in_order(mask, self.orientation).map_err(|e| Error::file(&path, e))?;
+        let mask = Arc::new(mask);
         self.mask = Some(Arc::clone(&mask));
         Ok(mask)
     }
@@ -168,7 +172,11 @@ impl Artifacts {
             }
             index += 1;
         });
-        let skeleton = Arc::new(Skeleton::new(grid.clone(), voxels));
+        let mut skeleton = Skeleton::new(grid.clone(), voxels);
+        if self.orientation == Orientation::Ras {
+            skeleton = skeleton.in_ras_order().map_err(|error| Error::file(&path, error))?;
+        }
+        let skeleton = Arc::new(skeleton);
         self.skeleton = Some(Arc::clone(&skeleton));
         Ok(skeleton)
     }

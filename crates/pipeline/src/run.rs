@@ -292,6 +292,7 @@ fn artifacts_of(request: &Request, source: &Source) -> Artifacts {
             series: input.series,
             resample: input.resample,
         },
+        orientation: config.volume.orientation,
         input: input.clone(),
         ..Artifacts::default()
     }

@@ -90,6 +90,9 @@ fn volume(step: &mut Step<'_>) -> Result<Outcome, Error> {
         n_foreground as f64 * mask.grid().voxel_volume_mm3() / 1000.0,
         describe_grid(mask.grid())
     );
+    if mask.grid().orientation() != segmented.stored_orientation {
+        line = format!("{line}, stored as {}", segmented.stored_orientation);
+    }
     let dropped = segmented.ledger.to_tsv();
     step.artifacts.dropped = Some(step.read_back(&dropped, Ledger::from_tsv)?);
     let n_dropped = segmented.report.get("components_dropped").unwrap_or(0.0);

@@ -1,17 +1,15 @@
-//! The working volume: the mask's foreground box, turned, padded, one bit a voxel.
+//! The working volume: the mask's foreground box, padded, one bit a voxel.
 //!
-//! **Input** a mask and the orientation. **Output** cells of a box, x fastest, with one layer of background
+//! **Input** a mask. **Output** cells of a box, x fastest, with one layer of background
 //! around, and the way back to the mask's own voxels.
 //! **Notation** a *cell* is a voxel of the padded box by the number of its bit in the list of words; rows begin a
 //! word, so the steps to the next row and slab are multiples of 64.
-//! **Steps** 1. Bounding box. 2. Permute and flip its axes so that they point right, anterior, superior (or
-//! leave them). 3. Copy, run by run.
+//! **Steps** 1. Bounding box. 2. Copy, run by run.
 //! **Guarantees** cropping keeps the order of the voxels, so no result depends on empty margins.
 //! **Cost** O(words of the mask + foreground).
 
 use espalier_model::{Bits, Mask};
 
-use crate::params::Orientation;
 use crate::simple::CENTER;
 
 /// Bits in a word.
@@ -21,50 +19,26 @@ pub(crate) const WORD: usize = u64::BITS as usize;
 #[derive(Clone, Debug)]
 pub(crate) struct Lattice {
     bits: Bits,
-    /// For each of the lattice's axes: the mask's axis, and whether both point the same way.
-    stored_axes: [(usize, bool); 3],
-    /// First and last voxel of the box in the mask.
-    bounds: ([usize; 3], [usize; 3]),
+    /// First voxel of the box in the mask.
+    low: [usize; 3],
     /// Distance between neighbours along the lattice's axes, in mm.
     spacing: [f64; 3],
 }
 
 impl Lattice {
     /// The lattice of a mask; `None` if it has no foreground.
-    pub(crate) fn from_mask(mask: &Mask, orientation: Orientation) -> Option<Self> {
-        let bounds = mask.bounding_box()?;
-        let (low, high) = bounds;
-        let mut stored_axes = [(0, true), (1, true), (2, true)];
-        if orientation == Orientation::Ras {
-            for (stored, (world, same_way)) in mask.grid().nearest_world_axes().into_iter().enumerate() {
-                stored_axes[world] = (stored, same_way);
-            }
-        }
-        let shape = stored_axes.map(|(stored, _)| high[stored] - low[stored] + 3);
-        let spacing_mm = mask.grid().spacing_mm();
-        let spacing = stored_axes.map(|(stored, _)| spacing_mm[stored]);
-        let mut lattice = Self { bits: Bits::new(shape), stored_axes, bounds, spacing };
-        lattice.copy(mask.bits());
-        Some(lattice)
-    }
-
-    /// Copies the foreground of the box.
-    fn copy(&mut self, mask: &Bits) {
-        let (low, high) = self.bounds;
-        let ny = mask.shape()[1];
-        let x_stays_x = self.stored_axes[0].0 == 0;
+    pub(crate) fn from_mask(mask: &Mask) -> Option<Self> {
+        let (low, high) = mask.bounding_box()?;
+        let shape = [0, 1, 2].map(|axis| high[axis] - low[axis] + 3);
+        let mut bits = Bits::new(shape);
+        let ny = mask.grid().shape()[1];
         for (z, y) in (low[2]..=high[2]).flat_map(|z| (low[1]..=high[1]).map(move |y| (z, y))) {
-            for run in mask.runs(z * ny + y) {
-                if x_stays_x {
-                    let ends = [run.start, run.end - 1].map(|x| self.coordinates_of([x, y, z]));
-                    let [_, row, slab] = ends[0];
-                    let first = ends[0][0].min(ends[1][0]);
-                    self.bits.fill_run(slab * self.shape()[1] + row, first..first + run.len());
-                } else {
-                    run.for_each(|x| self.bits.set(self.coordinates_of([x, y, z])));
-                }
+            let row = (z + 1 - low[2]) * shape[1] + y + 1 - low[1];
+            for run in mask.bits().runs(z * ny + y) {
+                bits.fill_run(row, run.start + 1 - low[0]..run.end + 1 - low[0]);
             }
         }
+        Some(Self { bits, low, spacing: mask.grid().spacing_mm().to_array() })
     }
 
     /// Extents with the padding, x fastest.
@@ -99,9 +73,10 @@ impl Lattice {
         words.flat_map(|(word, &bits)| ones(bits).map(move |bit| word * WORD + bit))
     }
 
-    /// The foreground as voxels of the mask, in no particular order.
-    pub(crate) fn stored_voxels(&self) -> Vec<[u32; 3]> {
-        self.bits.voxels().map(|voxel| self.stored_voxel(voxel)).collect()
+    /// The foreground as voxels of the mask.
+    pub(crate) fn mask_voxels(&self) -> Vec<[u32; 3]> {
+        let of_mask = |voxel: [usize; 3]| [0, 1, 2].map(|axis| (voxel[axis] + self.low[axis] - 1) as u32);
+        self.bits.voxels().map(of_mask).collect()
     }
 
     /// Whether a cell is foreground.
@@ -160,24 +135,6 @@ impl Lattice {
         let word = cell / WORD;
         [word % row_words * WORD + cell % WORD, word / row_words % self.shape()[1], word / slab_words]
     }
-
-    /// Where a voxel of the mask lies in the padded box.
-    fn coordinates_of(&self, stored: [usize; 3]) -> [usize; 3] {
-        let (low, high) = self.bounds;
-        self.stored_axes.map(|(axis, same_way)| {
-            1 + if same_way { stored[axis] - low[axis] } else { high[axis] - stored[axis] }
-        })
-    }
-
-    fn stored_voxel(&self, coordinates: [usize; 3]) -> [u32; 3] {
-        let (low, high) = self.bounds;
-        let mut stored = [0; 3];
-        for (coordinate, (axis, same_way)) in coordinates.into_iter().zip(self.stored_axes) {
-            let value = if same_way { low[axis] + coordinate - 1 } else { high[axis] + 1 - coordinate };
-            stored[axis] = value as u32;
-        }
-        stored
-    }
 }
 
 /// The places of the ones in a word, from the lowest.
@@ -209,7 +166,7 @@ mod tests {
         let grid = Grid::axis_aligned([140, 5, 4], DVec3::ONE, DVec3::ZERO).expect("grid");
         let noise: Vec<bool> = (0..grid.n_voxels()).map(|_| stream.below(2) == 0).collect();
         let mask = Mask::from_voxels(grid, &noise);
-        let lattice = Lattice::from_mask(&mask, Orientation::Stored).expect("not empty");
+        let lattice = Lattice::from_mask(&mask).expect("not empty");
         let (low, _) = mask.bounding_box().expect("not empty");
         for cell in lattice.foreground() {
             let voxel = lattice.coordinates(cell);

@@ -2,7 +2,7 @@
 //!
 //! | step | file | what |
 //! |--:|---|---|
-//! | 1 | `lattice` | crop the mask to its foreground, turn its axes to RAS, pad it with background |
+//! | 1 | `lattice` | crop the mask to its foreground, pad it with background |
 //! | 2 | `topology` | components and Euler number, before and after, for the report |
 //! | 3 | `euler`, `simple` | what a voxel's 26 neighbours say: end point, Euler invariance, simplicity |
 //! | 4 | `open` | the voxels that may have become deletable |
@@ -10,7 +10,8 @@
 //! | 6 | `depth`, `safe` | the same, level by level of depth in mm, with tips that hold (`safe`) |
 //! | 7 | `tips` | move tips to where they belong (`safe`) |
 //!
-//! Connectivity is 26 for the foreground and 6 for the background throughout.
+//! Connectivity is 26 for the foreground and 6 for the background throughout. Thinning settles ties by storage order, so
+//! masks should come with their axes towards right, anterior, superior, as the stage before hands them on.
 //!
 //! ```
 //! use espalier_model::{Grid, Mask};
@@ -39,7 +40,7 @@ mod topology;
 use espalier_model::{Mask, Report, Skeleton};
 
 pub use error::Error;
-pub use params::{Orientation, Params, Thinning};
+pub use params::{Params, Thinning};
 
 use lattice::Lattice;
 use simple::is_endpoint;
@@ -59,7 +60,7 @@ pub struct Skeletonized {
 /// # Errors
 /// [`Error::EmptyMask`] if there is no foreground.
 pub fn skeletonize(mask: &Mask, params: &Params) -> Result<Skeletonized, Error> {
-    let mut lattice = Lattice::from_mask(mask, params.orientation).ok_or(Error::EmptyMask)?;
+    let mut lattice = Lattice::from_mask(mask).ok_or(Error::EmptyMask)?;
     let mut report = Report::default();
     let mask_topology = topology::measure(lattice.bits());
     report.count_usize("foreground_voxels", lattice.bits().count());
@@ -68,7 +69,7 @@ pub fn skeletonize(mask: &Mask, params: &Params) -> Result<Skeletonized, Error> 
 
     let skeleton_topology = topology::measure(lattice.bits());
     let n_endpoints = lattice.foreground().filter(|&cell| is_endpoint(lattice.neighborhood(cell))).count();
-    let skeleton = Skeleton::new(mask.grid().clone(), lattice.stored_voxels());
+    let skeleton = Skeleton::new(mask.grid().clone(), lattice.mask_voxels());
     report.count_usize("skeleton_voxels", skeleton.voxels().len());
     report.count_usize("sweeps", n_sweeps);
     report.count_usize("skeleton_endpoints", n_endpoints);

@@ -9,9 +9,6 @@ use serde::{Deserialize, Serialize};
 pub struct Params {
     /// The thinning rule. Default `safe`: the published rule makes bars of even width vanish.
     pub thinning: Thinning,
-    /// The axis order in which voxels are visited. Default `ras`: the same organ stored in another axis order
-    /// gives the same skeleton.
-    pub orientation: Orientation,
 }
 
 /// Which rule decides what is deleted.
@@ -26,24 +23,13 @@ pub enum Thinning {
     Lee94,
 }
 
-/// In which axis order the voxels are visited.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Orientation {
-    /// x to the right, y to anterior, z to superior, as near as the grid's axes allow.
-    #[default]
-    Ras,
-    /// The order in which the voxels are stored, z slowest, x fastest.
-    Stored,
-}
-
 impl Params {
     /// The values that the paper's skeletons come nearest to: the published thinning rule.
     ///
     /// [Hu2022] takes its vessel skeletons from another program, so only the class of the method is theirs.
     #[must_use]
     pub fn paper() -> Self {
-        Self { thinning: Thinning::Lee94, orientation: Orientation::Ras }
+        Self { thinning: Thinning::Lee94 }
     }
 
     /// Checks the ranges: every value of these types is legal.

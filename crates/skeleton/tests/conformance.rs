@@ -8,7 +8,7 @@
 
 mod common;
 
-use espalier_skeleton::{Orientation, Params, Thinning, skeletonize};
+use espalier_skeleton::{Params, Thinning, skeletonize};
 use sha2::{Digest as _, Sha256};
 
 /// Name, skeleton voxels, first 16 hex digits of the sha256 of the skeleton as bytes 0 and 1, x fastest.
@@ -25,7 +25,7 @@ const CASES: [(&str, usize, &str); 7] = [
 #[test]
 fn lee94_is_the_reference_bit_for_bit() {
     let Some(data) = common::data_folder() else { return };
-    let params = Params { thinning: Thinning::Lee94, orientation: Orientation::Stored };
+    let params = Params { thinning: Thinning::Lee94 };
     for (name, n_voxels, digest) in CASES {
         let mask = common::read_mask(&data.join(format!("volumes/{name}.nii.gz")));
         let reference = common::read_mask(&data.join(format!("reference/lee94/{name}.nii.gz")));
@@ -45,7 +45,7 @@ fn lee94_is_the_reference_bit_for_bit() {
 
 #[test]
 fn lee94_is_scikit_image_on_400_small_volumes() {
-    let params = Params { thinning: Thinning::Lee94, orientation: Orientation::Stored };
+    let params = Params { thinning: Thinning::Lee94 };
     let (mut n_cases, mut n_voxels) = (0, 0);
     for (name, mask, expected) in common::fixture() {
         n_cases += 1;

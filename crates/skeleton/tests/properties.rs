@@ -11,7 +11,7 @@ mod common;
 use common::{grid, mask_of, skeleton_mask, topology};
 use espalier_geom::random::{Purpose, Stream};
 use espalier_model::Mask;
-use espalier_skeleton::{Orientation, Params, Thinning, skeletonize};
+use espalier_skeleton::{Params, Thinning, skeletonize};
 use glam::DVec3;
 
 /// A random volume: white noise for odd seeds, blobs for even ones.
@@ -35,7 +35,7 @@ fn random_mask(seed: u32) -> Mask {
 
 /// What must hold for `safe` on any mask.
 fn check_safe(mask: &Mask, name: &str) {
-    let params = Params { orientation: Orientation::Stored, ..Params::default() };
+    let params = Params::default();
     let thinned = skeletonize(mask, &params).expect("not empty");
     let skeleton = skeleton_mask(mask, &params);
     assert_eq!(topology(&skeleton), topology(mask), "{name}: components, Euler number");
@@ -85,7 +85,7 @@ fn safe_keeps_the_topology_of_real_masks_and_does_not_fray() {
         if mask.n_foreground() < 10_000 {
             check_safe(&mask, name);
         }
-        let params = Params { orientation: Orientation::Stored, ..Params::default() };
+        let params = Params::default();
         let thinned = skeletonize(&mask, &params).expect("not empty");
         assert!(thinned.report.warnings.is_empty(), "{name}: {:?}", thinned.report.warnings);
         let n_ends = thinned.report.get("skeleton_endpoints").expect("count");
@@ -121,7 +121,7 @@ fn safe_keeps_the_topology_of_full_volumes() {
 
 #[test]
 fn lee94_counts_what_it_loses() {
-    let params = Params { thinning: Thinning::Lee94, orientation: Orientation::Stored };
+    let params = Params { thinning: Thinning::Lee94 };
     let mut n_changed = 0;
     for seed in 0..200 {
         let mask = random_mask(seed);
@@ -143,7 +143,7 @@ fn empty_margins_change_nothing() {
     let [nx, ny, nz] = inner.grid().shape();
     let outer = mask_of([nx + 5, ny + 4, nz + 3], |p| inner.contains((p - 2.0).to_array().map(|c| c as i64)));
     for thinning in [Thinning::Safe, Thinning::Lee94] {
-        let params = Params { thinning, ..Params::default() };
+        let params = Params { thinning };
         let voxels = |mask| skeletonize(mask, &params).expect("not empty").skeleton.voxels().to_vec();
         let shifted: Vec<[u32; 3]> = voxels(&inner).into_iter().map(|v| v.map(|c| c + 2)).collect();
         assert_eq!(voxels(&outer), shifted, "{thinning:?}");

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use espalier_model::Diagnose;
 use espalier_model::diagnose::{Class, ParamError};
+use espalier_model::{Diagnose, GridError};
 use thiserror::Error;
 
 use crate::ReadError;
@@ -158,6 +158,9 @@ pub enum Error {
         /// How many are allowed.
         limit: u64,
     },
+    /// The mask's place in the world is beyond the largest number.
+    #[error("the volume cannot be turned to right, anterior, superior: {0}")]
+    Turn(#[from] GridError),
     /// The region grows with the threshold all the way.
     #[error("the region about the seed grows all the way with the threshold, so where it leaks cannot be told: {}", .curve.map(|(threshold, ml)| format!("{ml:.1} ml at {threshold}")).join(", "))]
     NoKnee {
@@ -179,6 +182,7 @@ impl Diagnose for Error {
             Self::AbsentLabel { .. } => "E-VOLUME-LABEL-ABSENT",
             Self::NoLabelMap { .. } | Self::NotRegions { .. } => "E-VOLUME-NO-LABELS",
             Self::NoTrachea { .. } => "E-VOLUME-NO-TRACHEA",
+            Self::Turn(error) => error.code(),
             Self::NoKnee { .. } => "E-VOLUME-NO-KNEE",
             Self::Closing { .. } => "E-VOLUME-CLOSING",
             Self::Grid(_) => "E-VOLUME-RESAMPLE",
@@ -199,6 +203,7 @@ impl Diagnose for Error {
             | Self::Grid(_) => Class::Usage,
             Self::TooLarge { .. } => Class::Limit,
             Self::AbsentLabel { .. } | Self::NoLabelMap { .. } | Self::NotRegions { .. } => Class::Input,
+            Self::Turn(error) => error.class(),
             Self::Empty { .. } | Self::NoTrachea { .. } | Self::NoKnee { .. } => Class::Input,
         }
     }
@@ -229,6 +234,7 @@ impl Diagnose for Error {
             Self::NoTrachea { .. } => {
                 "set volume.seed_voxel = [x, y, z] (or volume.seed_mm, RAS+) to a voxel inside the trachea".to_owned()
             }
+            Self::Turn(_) => "move the volume nearer to the origin, or set volume.orientation = \"stored\"".to_owned(),
             Self::NoKnee { .. } => {
                 "set volume.upper (airways) or volume.lower (vessels), or another volume.seed_voxel".to_owned()
             }

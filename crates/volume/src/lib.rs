@@ -25,7 +25,8 @@
 //! | **[`segment`]**: `Volume` → [`Mask`](espalier_model::Mask) | `segment` |
 //! | **[`read_mask`]**: file → `Mask`, without holding the volume where values alone decide | `read_mask`, `stream` |
 //!
-//! **Spaces** World is RAS+ mm. A voxel is (x, y, z) on the file's own axes, x fastest.
+//! **Spaces** World is RAS+ mm. A voxel is (x, y, z), x fastest: of a volume on the file's own axes, of a mask on those
+//! of [`Orientation`].
 //!
 //! **Architecture Invariant:** this is the only stage that reads files, and it writes none. No byte of a file
 //! makes it panic, recurse, or hold more than the limit that the caller states.
@@ -85,10 +86,10 @@ pub use growth::{GROWTH_COLUMNS, Growth, Knee, Level, Towards};
 pub use kind::{Kind, check_regions, inspect_kind};
 pub use labels::{Label, Labels};
 pub use options::{AssumedSpace, ReadOptions};
-pub use params::{Components, Method, Params, Preset};
+pub use params::{Components, Method, Orientation, Params, Preset};
 pub use read::{Loaded, files, read};
 pub use read_error::ReadError;
 pub use read_mask::read_mask;
-pub use segment::{Segmented, clean, segment};
+pub use segment::{Segmented, clean, in_order, segment};
 pub use spacing::Spacing;
 pub use trachea::{SEED_COLUMNS, SeedCandidate, seeds_to_tsv};

@@ -56,6 +56,9 @@ pub struct Params {
     /// The least volume of a component that stays, in ml, 0 to 1e6. Default 0: all that `components` keeps. With
     /// `components = "all"`, every component of at least this volume. Larger: fewer and larger components.
     pub min_component_ml: f64,
+    /// The axis order of the mask, and of every volume that is made from it. Default `ras`: one organ gives one result
+    /// in whatever order a file stores it.
+    pub orientation: Orientation,
     /// Whether background that is closed in by the mask (6-connected) becomes foreground. Default true: a cavity
     /// would become a closed shell in the skeleton.
     pub fill_cavities: bool,
@@ -79,10 +82,23 @@ impl Default for Params {
             closing_mm: 0.0,
             components: Components::Largest,
             min_component_ml: 0.0,
+            orientation: Orientation::Ras,
             fill_cavities: true,
             close_tunnels: true,
         }
     }
+}
+
+/// In which axis order a mask is handed on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Orientation {
+    /// x to the right, y to anterior, z to superior, as near as the scan's axes allow; the origin rounded to a 128th of
+    /// a voxel, which single precision cannot blur.
+    #[default]
+    Ras,
+    /// That of the file, and its origin: for comparisons voxel by voxel.
+    Stored,
 }
 
 /// What a scan shows.

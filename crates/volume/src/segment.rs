@@ -2,10 +2,11 @@
 //!
 //! **Input** a volume and [`Params`]. **Output** [`Segmented`].
 //! **Steps** 0. a scan that is wanted at another spacing is resampled; 1. choose the organ's voxels by value, or by
-//! growing from a seed; 2. a mask that is wanted at another spacing is resampled; 3. close gaps; 4. drop all but the
-//! largest components; 5. fill cavities; 6. close tunnels that are faults of the mask.
-//! **Guarantees** the mask has at least one voxel, and the volume's grid unless another spacing was asked for; every
-//! step's effect is in the report.
+//! growing from a seed; 2. turn the axes to right, anterior, superior; 3. a mask that is wanted at another spacing is
+//! resampled; 4. close gaps; 5. drop all but the largest components; 6. fill cavities; 7. close tunnels that are faults
+//! of the mask.
+//! **Guarantees** the mask has at least one voxel, and lies where the volume does; it depends on what is in the volume,
+//! not on the order in which a file stores it; every step's effect is in the report.
 
 use espalier_model::{Bits, Grid, Ledger, Mask, Report, Volume};
 use glam::DVec3;
@@ -19,8 +20,8 @@ use crate::runs::{Connectivity, Runs};
 use crate::select::{Selection, needs_preset, select};
 use crate::trachea::SeedCandidate;
 use crate::{
-    Error, Method, Params, ReadOptions, cavities, closing, components, heal, inspect_kind, region_grow,
-    resample,
+    Error, Method, Orientation, Params, ReadOptions, cavities, closing, components, heal, inspect_kind,
+    region_grow, resample,
 };
 
 /// How often places to close tunnels are looked for; on the masks at hand the second pass finds a few, the third
@@ -32,7 +33,10 @@ const MAX_PASSES: usize = 4;
 pub struct Segmented {
     /// The organ.
     pub mask: Mask,
-    /// An entry for each gap that was closed, largest first, beyond 200 one for all others; for each component that was dropped, largest first, beyond 200 one for all others; then an entry for
+    /// Where x, y and z pointed before the turn, such as `LPS`.
+    pub stored_orientation: String,
+    /// An entry for each gap that was closed, largest first, beyond 200 one for all others; for each component that was
+    /// dropped, largest first, beyond 200 one for all others; then an entry for
     /// each place at which a tunnel was closed.
     pub ledger: Ledger,
     /// Counts `selected_voxels`, `selected_ml`, where gaps were closed `closing_patches`, `closing_filled_voxels`; `components`, `components_dropped`, `components_dropped_voxels`,
@@ -131,7 +135,7 @@ pub(crate) fn segment_selection(
     Ok(Segmented { report, growth: selection.growth, seeds: selection.seeds, ..cleaned })
 }
 
-/// Cleans a mask: of the parameters, all that do not choose voxels.
+/// Cleans a mask: of the parameters, all that do not choose voxels. Turns its axes first.
 ///
 /// # Errors
 /// [`Error`] for parameters out of range, and for a mask of which nothing is left.
@@ -143,10 +147,13 @@ pub fn clean(mask: Mask, params: &Params) -> Result<Segmented, Error> {
 fn clean_within(mask: Mask, params: &Params, max_bytes: u64) -> Result<Segmented, Error> {
     params.validate()?;
     let mut report = Report::default();
-    let mask = match params.resample_mm {
-        Some(spacing) => resample::mask(mask, spacing, max_bytes, &mut report)?,
-        None => mask,
-    };
+    // What follows settles ties by storage order, here and in the later stages.
+    let stored_orientation = mask.grid().orientation();
+    let mut mask = in_order(mask, params.orientation)?;
+    if let Some(spacing) = params.resample_mm {
+        // The new grid has an origin of its own.
+        mask = in_order(resample::mask(mask, spacing, max_bytes, &mut report)?, params.orientation)?;
+    }
     let grid = mask.grid().clone();
     let millilitres = |n_voxels: usize| n_voxels as f64 * grid.voxel_volume_mm3() / 1000.0;
     let mut bits = mask.into_bits();
@@ -201,7 +208,18 @@ fn clean_within(mask: Mask, params: &Params, max_bytes: u64) -> Result<Segmented
     }
     report.count_usize("foreground_voxels", n_foreground);
     report.count("foreground_ml", millilitres(n_foreground));
-    Ok(Segmented { mask, ledger, report, growth: None, seeds: Vec::new() })
+    Ok(Segmented { mask, stored_orientation, ledger, report, growth: None, seeds: Vec::new() })
+}
+
+/// The mask in the axis order that is wanted.
+///
+/// # Errors
+/// [`Error::Turn`] where its place in the world is beyond the largest number.
+pub fn in_order(mask: Mask, orientation: Orientation) -> Result<Mask, Error> {
+    match orientation {
+        Orientation::Ras => Ok(mask.in_ras_order()?),
+        Orientation::Stored => Ok(mask),
+    }
 }
 
 /// Cavities that were filled.

@@ -9,8 +9,8 @@
 //! 2. Stack them from the top down. 3. Columns that are long enough are candidates; the score prefers long, wide,
 //! round and high ones: the trachea is above the main bronchi and above any gas in the abdomen. 4. The seed is the
 //! darkest voxel near the centre of the column's middle slice.
-//! **Guarantees** the result does not depend on the number of threads. Nothing is guessed: without a candidate there
-//! is no seed, and the caller says so.
+//! **Guarantees** the result depends neither on the number of threads nor on the scan's axis order. Nothing is guessed:
+//! without a candidate there is no seed, and the caller says so.
 //! **Differs from the source** [Mori1996] seed by hand; searching the top slices alone, as is usual, finds nothing in
 //! a crop whose top is below the larynx or above which the trachea does not go.
 //! **Cost** O(voxels) time, a slice a thread in memory.
@@ -119,7 +119,8 @@ struct Axes {
     side: usize,
     front: usize,
     up: usize,
-    is_up: bool,
+    /// Whether they point to the right, to the front and up.
+    is_along: [bool; 3],
     shape: [usize; 3],
     spacing_mm: [f64; 3],
     n_slices: usize,
@@ -131,15 +132,17 @@ impl Axes {
         let axis_of = |world| nearest.iter().position(|&(axis, _)| axis == world).unwrap_or(world);
         let (side, front, up) = (axis_of(0), axis_of(1), axis_of(2));
         let (shape, spacing_mm) = (grid.shape(), grid.spacing_mm().to_array());
-        Self { side, front, up, is_up: nearest[up].1, shape, spacing_mm, n_slices: shape[up] }
+        let is_along = [side, front, up].map(|axis| nearest[axis].1);
+        Self { side, front, up, is_along, shape, spacing_mm, n_slices: shape[up] }
     }
 
     /// The voxel at a place of a slice, slices counted from the top.
     fn voxel(&self, [u, v]: [usize; 2], depth: usize) -> [usize; 3] {
         let mut voxel = [0; 3];
-        voxel[self.side] = u;
-        voxel[self.front] = v;
-        voxel[self.up] = if self.is_up { self.n_slices - 1 - depth } else { depth };
+        let place = [u, v, self.n_slices - 1 - depth];
+        for (i, axis) in [self.side, self.front, self.up].into_iter().enumerate() {
+            voxel[axis] = if self.is_along[i] { place[i] } else { self.shape[axis] - 1 - place[i] };
+        }
         voxel
     }
 

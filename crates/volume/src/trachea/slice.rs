@@ -26,7 +26,7 @@ const N_RAYS: usize = 16;
 const WALL_MM: f64 = 4.0;
 const WALL_HU: f64 = -500.0;
 const MIN_WALLED: f64 = 0.6;
-/// An axial slice: u to the side, v to the front or back, u fastest.
+/// An axial slice: u to the right, v to the front, u fastest, however the scan is stored.
 pub(super) struct Slice {
     depth: usize,
     shape: [usize; 2],
