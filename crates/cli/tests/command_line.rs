@@ -1,24 +1,13 @@
 //! The program as its user meets it: exit codes, messages, files left behind.
 #![allow(clippy::expect_used, reason = "a test says what it expects")]
 
+mod program;
+
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 
+use program::{espalier, stderr};
 use tempfile::TempDir;
-
-fn espalier(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_espalier"))
-        .args(arguments)
-        .current_dir(folder)
-        .env_remove("ESPALIER_DATA")
-        .output()
-        .expect("the program starts")
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
 
 /// A folder with one file in it.
 fn folder_with(name: &str, bytes: &[u8]) -> TempDir {

@@ -4,25 +4,14 @@
 #[path = "../../volume/tests/slices/mod.rs"]
 mod slices;
 
+mod program;
+
 use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
+use program::{espalier, stderr};
 use slices::{SECRETS, Slice, stack, write};
-
-fn espalier(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_espalier"))
-        .args(arguments)
-        .current_dir(folder)
-        .env_remove("ESPALIER_DATA")
-        .output()
-        .expect("the program starts")
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
 
 /// A folder `scan` of slices 2 mm apart, with names that are a patient's.
 fn scan(slices: &[Slice]) -> tempfile::TempDir {

@@ -1,25 +1,17 @@
 //! What a user says of an input: the names of its labels, its space, one volume of several, a preset.
 #![allow(clippy::expect_used, reason = "a test says what it expects")]
 
+mod program;
+
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
 
+use program::{espalier, stderr};
 use tempfile::TempDir;
-
-fn espalier(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_espalier"))
-        .args(arguments)
-        .current_dir(folder)
-        .env_remove("ESPALIER_DATA")
-        .output()
-        .expect("the program starts")
-}
 
 /// The exit code, and what was said.
 fn said(folder: &TempDir, arguments: &[&str]) -> (Option<i32>, String) {
     let output = espalier(folder.path(), arguments);
-    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    (output.status.code(), stderr(&output))
 }
 
 /// A folder with `map.mhd` and its data: 12×6×6 voxels of 1 mm with the labels 10, 20 and 30 one beside the other.

@@ -1,11 +1,10 @@
 //! Every file of the bad data: what it is read as, or which error it gives; and hostile bytes made here.
-#![allow(clippy::expect_used, clippy::panic, clippy::print_stdout, reason = "this is how a test speaks")]
-#![allow(clippy::disallowed_methods, reason = "tests find their data through the environment")]
+#![allow(clippy::expect_used, clippy::panic, reason = "this is how a test speaks")]
 
-use std::path::{Path, PathBuf};
+mod common;
 
+use common::{data, outcome};
 use espalier_geom::random::{Purpose, Stream};
-use espalier_model::Diagnose;
 use espalier_volume::{Error, Params, ReadError, ReadOptions, read, read_mask};
 
 /// Enough for every legal file of the data, too little for the bombs.
@@ -18,35 +17,6 @@ const OPTIONS: ReadOptions = ReadOptions {
     series: None,
     resample: false,
 };
-
-/// `shape orientation warnings`, or the error's code and exit code.
-fn outcome(path: &Path, options: &ReadOptions) -> String {
-    match read(path, options) {
-        Ok(loaded) => {
-            let grid = loaded.volume.grid();
-            let [nx, ny, nz] = grid.shape();
-            let warnings = loaded.report.warnings.iter().map(|warning| warning.code);
-            let words = [format!("{nx}x{ny}x{nz}"), grid.orientation()];
-            words.into_iter().chain(warnings.map(str::to_owned)).collect::<Vec<_>>().join(" ")
-        }
-        Err(error) => {
-            assert!(!error.hint().is_empty(), "{error} has no way out");
-            assert!(
-                error.to_string().ends_with(&path.display().to_string()),
-                "{error} does not end with the path"
-            );
-            format!("{} {}", error.code(), error.class().exit_code())
-        }
-    }
-}
-
-fn data() -> Option<PathBuf> {
-    let folder = std::env::var_os("ESPALIER_DATA").map(PathBuf::from);
-    if folder.is_none() {
-        println!("skipped: ESPALIER_DATA not set");
-    }
-    folder
-}
 
 /// The table is complete in both directions: every file has a line, every line a file.
 #[test]

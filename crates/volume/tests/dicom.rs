@@ -321,3 +321,31 @@ fn mutants_never_panic() {
     }
     assert!(n_read > 100 && n_refused > 100, "{n_read} read, {n_refused} refused: too one-sided");
 }
+
+/// Deflated data sets, some with much before the pixels: the same scan, whatever is in the way; cut short, an error.
+#[test]
+fn deflated_slices_are_the_same_scan() {
+    let slices = stack(&[0.0, 2.0, 4.0, 6.0]);
+    let plain = loaded(&slices);
+    let folder = scratch();
+    // A comment of a megabyte, which deflates to very little.
+    let comment = vec![b' '; 1 << 20];
+    let wide = |slice: &Slice| slice.clone().with(0x0028_4000, "UN", &comment).deflated();
+    let files: Vec<Vec<u8>> =
+        slices.iter().enumerate().map(|(i, s)| if i < 2 { s.deflated() } else { wide(s) }).collect();
+    assert!(files.iter().all(|file| file.len() < 64 << 10));
+    let write = |files: &[Vec<u8>]| {
+        for (index, file) in files.iter().enumerate() {
+            std::fs::write(folder.path().join(format!("{index}.dcm")), file).expect("writable");
+        }
+    };
+    write(&files);
+    let inflated = read(folder.path(), &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(inflated.volume, plain.volume);
+    // Less than the comment may be held: the slice is named, and nothing is guessed.
+    let little = ReadOptions { max_bytes: 512 << 10, ..ReadOptions::default() };
+    assert_eq!(dicom_error(read(folder.path(), &little)).class().exit_code(), 3);
+    let cut: Vec<Vec<u8>> = files.iter().map(|file| file[..file.len() - 30].to_vec()).collect();
+    write(&cut);
+    assert_eq!(dicom_error(read(folder.path(), &ReadOptions::default())).class().exit_code(), 3);
+}

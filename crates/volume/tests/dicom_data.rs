@@ -1,47 +1,18 @@
 //! DICOM of other people: what each file and folder of the data comes to, and the scans among them against the same
 //! scans in other formats and as another program reads them.
-#![allow(clippy::expect_used, clippy::panic, clippy::print_stdout, reason = "this is how a test speaks")]
-#![allow(clippy::disallowed_methods, reason = "tests find their data through the environment")]
+#![allow(clippy::expect_used, clippy::print_stdout, reason = "this is how a test speaks")]
+
+mod common;
 
 use std::path::{Path, PathBuf};
 
-use espalier_model::{Diagnose, Volume};
+use common::{data, load, outcome};
+use espalier_model::Volume;
 use espalier_volume::{Loaded, ReadOptions, read};
 use glam::DVec3;
 
-fn data() -> Option<PathBuf> {
-    let folder = std::env::var_os("ESPALIER_DATA").map(PathBuf::from);
-    if folder.is_none() {
-        println!("skipped: ESPALIER_DATA not set");
-    }
-    folder
-}
-
-fn load(path: &Path, options: &ReadOptions) -> Loaded {
-    read(path, options).unwrap_or_else(|error| panic!("{error}"))
-}
-
 fn resampled() -> ReadOptions {
     ReadOptions { resample: true, ..ReadOptions::default() }
-}
-
-/// `shape orientation warnings`, or the error's code and exit code.
-fn outcome(path: &Path, options: &ReadOptions) -> String {
-    match read(path, options) {
-        Ok(loaded) => {
-            let grid = loaded.volume.grid();
-            let [nx, ny, nz] = grid.shape();
-            let warnings = loaded.report.warnings.iter().map(|warning| warning.code);
-            let words = [format!("{nx}x{ny}x{nz}"), grid.orientation()];
-            words.into_iter().chain(warnings.map(str::to_owned)).collect::<Vec<_>>().join(" ")
-        }
-        Err(error) => {
-            assert!(!error.hint().is_empty(), "{error} has no way out");
-            let place = path.display().to_string();
-            assert!(error.to_string().ends_with(&place), "{error} does not end with the path");
-            format!("{} {}", error.code(), error.class().exit_code())
-        }
-    }
 }
 
 /// The files below a folder, and the folders themselves, by name.

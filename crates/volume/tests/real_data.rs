@@ -1,22 +1,14 @@
 //! The volumes of the real data: what they are, and the airway that region growing must find.
 #![allow(clippy::expect_used, clippy::panic, clippy::print_stdout, reason = "this is how a test speaks")]
-#![allow(clippy::disallowed_methods, reason = "tests find their data through the environment")]
 
-use std::path::PathBuf;
+mod common;
 
+use common::data;
 use espalier_model::{Diagnose, LedgerKind, Mask};
 use espalier_volume::{
     Components, Error, Kind, Labels, Method, Params, Preset, ReadOptions, Segmented, inspect_kind, read,
     read_mask, segment,
 };
-
-fn data() -> Option<PathBuf> {
-    let folder = std::env::var_os("ESPALIER_DATA").map(PathBuf::from);
-    if folder.is_none() {
-        println!("skipped: ESPALIER_DATA not set");
-    }
-    folder
-}
 
 fn load(name: &str) -> Option<espalier_volume::Loaded> {
     let path = data()?.join("volumes").join(name);

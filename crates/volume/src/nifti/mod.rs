@@ -70,7 +70,7 @@ fn header_unit_mm(fields: &Fields, report: &mut Report) -> f64 {
         2 => 1.0,
         3 => 1e-3,
         other => {
-            let what = if other == 0 { "does not state" } else { "states an unknown" };
+            let what = if other == 0 { "states no" } else { "states an unknown" };
             report.warn("W-VOLUME-NO-UNITS", format!("the header {what} unit of length: taken as mm"));
             1.0
         }

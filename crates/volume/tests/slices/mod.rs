@@ -50,6 +50,17 @@ impl Slice {
 
     /// The file.
     pub(crate) fn bytes(&self) -> Vec<u8> {
+        [preamble(b"1.2.840.10008.1.2.1"), self.data_set()].concat()
+    }
+
+    /// The file with a deflated data set.
+    pub(crate) fn deflated(&self) -> Vec<u8> {
+        let mut deflated = flate2::write::DeflateEncoder::new(Vec::new(), flate2::Compression::best());
+        std::io::Write::write_all(&mut deflated, &self.data_set()).expect("to memory");
+        [preamble(b"1.2.840.10008.1.2.1.99"), deflated.finish().expect("to memory")].concat()
+    }
+
+    fn data_set(&self) -> Vec<u8> {
         let decimals = |values: &[f64]| {
             values.iter().map(|value| format!("{value}")).collect::<Vec<_>>().join("\\").into_bytes()
         };
@@ -90,14 +101,16 @@ impl Slice {
             elements.push(more.clone());
         }
         elements.sort_by_key(|element| element.0);
-        let mut bytes = vec![0; 128];
-        bytes.extend(b"DICM");
-        bytes.extend(element(0x0002_0010, "UI", b"1.2.840.10008.1.2.1".to_vec()));
-        bytes.extend(
-            elements.into_iter().flat_map(|(tag, representation, value)| element(tag, representation, value)),
-        );
-        bytes
+        elements
+            .into_iter()
+            .flat_map(|(tag, representation, value)| element(tag, representation, value))
+            .collect()
     }
+}
+
+/// What stands before the data set.
+fn preamble(syntax: &[u8]) -> Vec<u8> {
+    [vec![0; 128], b"DICM".to_vec(), element(0x0002_0010, "UI", syntax.to_vec())].concat()
 }
 
 fn element(tag: u32, representation: &str, mut value: Vec<u8>) -> Vec<u8> {
