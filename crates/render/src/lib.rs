@@ -2,6 +2,7 @@
 //!
 //! | step | file | what |
 //! |--:|---|---|
+//! | 0 | `map` | what each point of the plane stands for in the patient |
 //! | 1 | `scene` | nodes in picture space: the map, or the global view |
 //! | 2 | `coloring`, `palette`, `unit` | a value for each end of each edge, its colour, its scale |
 //! | 3 | `heading`, `furniture`, `text` | what stands beside the tree, and how much room it needs |
@@ -14,6 +15,8 @@
 //! **Source** section 4.1 of [Hu2022].
 
 mod params;
+
+mod map;
 
 mod scene;
 
@@ -56,6 +59,7 @@ pub use chart::{Chart, Charts, charts};
 use coloring::Coloring;
 pub use convergence::{Searched, convergence};
 pub use error::Error;
+pub use map::{Beside, Place, PlanarMap, reach};
 use furniture::Heading;
 use kinship::Kinship;
 use page::{Needs, Page, Pen};
