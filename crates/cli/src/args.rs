@@ -1,5 +1,6 @@
 //! The command line.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
@@ -19,6 +20,7 @@ Examples:
   espalier skeleton mask.nii.gz -o out/skeleton         one stage on files
   espalier compare out/airway                           its methods side by side: table and figure
   espalier verify out/airway                            does everything hold that the folder says?
+  espalier locate out/airway -32.7,-168.8,-161.8        where is this point of the scan on the map?
   espalier sweep my.toml --over embed.w_length=0.5,1,2  losses against a setting: table and plot
   espalier phantom airway -o phantoms/airway            test data with its truth
 
@@ -135,6 +137,8 @@ pub(crate) enum Command {
     Verify(VerifyArguments),
     /// The calibre on the way from the root to a place of a run:  espalier profile RUN --node N
     Profile(ProfileArguments),
+    /// From the scan to the map and back, of a run:  espalier locate RUN X,Y,Z, or espalier locate RUN U,V
+    Locate(LocateArguments),
 }
 
 /// `espalier run`.
@@ -275,6 +279,56 @@ pub(crate) struct PlaceArguments {
     /// To the node nearest to this point, RAS+ mm
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
     pub(crate) to: Option<[f64; 3]>,
+}
+
+const LOCATE_HELP: &str = "\
+Three numbers are a point of the patient, RAS+ mm: say --lps for coordinates of DICOM, ITK and ITK-SNAP, --voxel for indices
+of the run's mask. Two are a point of the map, mm to the right and up as in nodes.tsv: say --pixel for pixels of planar.png.
+The answer has the point on both sides, its branch with generation and radius, the path length from the root, and how far
+off the centreline it lies; a point beyond the radius is \"outside\", and the nearest branch is named. One point is answered
+with a line a quantity, several with a table.
+
+Examples:
+  espalier locate out/airway -32.7,-168.8,-161.8        where is this on the map?
+  espalier locate out/airway 41.5,-80.2                 what does this place of the map show?
+  espalier locate out/airway 812,440 --pixel            the same by a pixel of planar.png
+  espalier locate out/airway 58,80,85 --voxel --json
+  espalier locate out/airway --from points.tsv --lps    many points; - is standard input";
+
+/// `espalier locate`.
+#[derive(Debug, Args)]
+#[command(after_help = LOCATE_HELP)]
+pub(crate) struct LocateArguments {
+    /// The run folder
+    #[arg(value_name = "RUN")]
+    pub(crate) folder: PathBuf,
+    /// Points: X,Y,Z of the patient or U,V of the map
+    #[arg(value_name = "X,Y,Z|U,V", required_unless_present = "from")]
+    pub(crate) points: Vec<String>,
+    /// Points from a table, one a line, numbers apart by tabs, commas or blanks; - is standard input
+    #[arg(long, value_name = "FILE")]
+    pub(crate) from: Option<PathBuf>,
+    /// Three numbers are LPS+ mm, as in DICOM and ITK
+    #[arg(long, conflicts_with = "voxel")]
+    pub(crate) lps: bool,
+    /// Three numbers are voxels of the run's mask, from 0
+    #[arg(long)]
+    pub(crate) voxel: bool,
+    /// Two numbers are pixels of planar.png, from 0 at the upper left
+    #[arg(long)]
+    pub(crate) pixel: bool,
+    /// Print the points as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// An argument such as `-32.7,4,5` is a point, not an option: a blank before it says so, which readers of points pass over.
+pub(crate) fn shield_point(argument: OsString) -> OsString {
+    let is_point = argument.to_str().is_some_and(|text| {
+        let rest = text.strip_prefix('-').unwrap_or_default();
+        text.contains(',') && rest.starts_with(|first: char| first.is_ascii_digit() || first == '.')
+    });
+    if is_point { [OsString::from(" "), argument].into_iter().collect() } else { argument }
 }
 
 fn parse_point(text: &str) -> Result<[f64; 3], String> {

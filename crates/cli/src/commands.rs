@@ -1,6 +1,8 @@
 //! What each command does.
 
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -8,13 +10,13 @@ use anyhow::anyhow;
 use espalier_model::Diagnose;
 use espalier_model::diagnose::Class;
 use espalier_pipeline::{
-    Artifact, CompareRequest, Config, Error, Loaded, Override, Request, SideFile, Stage, Subject, Summary,
-    SweepRequest, WayTo,
+    Artifact, CompareRequest, Config, Error, Loaded, Override, Request, SideFile, Space, Stage, Subject,
+    Summary, SweepRequest, WayTo,
 };
 
 use crate::args::{
-    Arguments, Command, CompareArguments, PhantomArguments, PlaceArguments, ProfileArguments, RunArguments,
-    StageArguments, SweepArguments, VerifyArguments,
+    Arguments, Command, CompareArguments, LocateArguments, PhantomArguments, PlaceArguments,
+    ProfileArguments, RunArguments, StageArguments, SweepArguments, VerifyArguments,
 };
 use crate::checks;
 use crate::progress::{self, Progress};
@@ -38,6 +40,7 @@ pub(crate) fn execute(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Render(stage) => run_stage(arguments, stage, Stage::Render)?,
         Command::Verify(verify) => return verify_folder(arguments, verify),
         Command::Profile(profile) => return print_profile(profile),
+        Command::Locate(locate) => return print_located(arguments, locate),
     };
     for file in &summary.highlights {
         progress::result(&summary.out.join(file).display().to_string());
@@ -68,6 +71,54 @@ fn print_profile(profile: &ProfileArguments) -> anyhow::Result<()> {
     let way_to = way_to.ok_or_else(|| anyhow!("say where to: --node, --branch or --to"))?;
     progress::result(espalier_pipeline::profile(&profile.folder, way_to)?.trim_end());
     Ok(())
+}
+
+/// Prints where points lie on both sides.
+fn print_located(arguments: &Arguments, locate: &LocateArguments) -> anyhow::Result<()> {
+    let in_patient = match (locate.lps, locate.voxel) {
+        (true, _) => Space::Lps,
+        (_, true) => Space::Voxel,
+        _ => Space::Ras,
+    };
+    let spaces = [in_patient, if locate.pixel { Space::Pixel } else { Space::Plane }];
+    let point = |text: &String| {
+        espalier_pipeline::read_point(text, spaces).map_err(|cause| Error::Point { source_name: None, cause })
+    };
+    let mut points = locate.points.iter().map(point).collect::<Result<Vec<_>, _>>()?;
+    if let Some(path) = &locate.from {
+        let (source_name, table) = read_table(path)?;
+        let more = espalier_pipeline::read_points(&table, spaces);
+        points.extend(more.map_err(|cause| Error::Point { source_name: Some(source_name), cause })?);
+    }
+    let max_memory = arguments.common.max_memory.unwrap_or_else(half_of_memory);
+    let located = espalier_pipeline::locate(&locate.folder, &points, max_memory)?;
+    let text = match (locate.json, points.len()) {
+        (true, _) => located.to_json(),
+        (false, 1) => located.to_text(),
+        _ => located.to_tsv(),
+    };
+    progress::result(text.trim_end());
+    Ok(())
+}
+
+/// The largest table of points that is read.
+const MAX_TABLE_BYTES: u64 = 64 << 20;
+
+/// A table and its name, from a file or from standard input.
+fn read_table(path: &Path) -> Result<(String, String), Error> {
+    let (name, read): (&Path, Box<dyn Read>) = if path == Path::new("-") {
+        (Path::new("standard input"), Box::new(std::io::stdin()))
+    } else {
+        let open = File::open(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
+        (path, Box::new(open))
+    };
+    let mut text = String::new();
+    let n_read = read.take(MAX_TABLE_BYTES + 1).read_to_string(&mut text);
+    let needed = n_read.map_err(|source| Error::Read { path: name.to_owned(), source })? as u64;
+    if needed > MAX_TABLE_BYTES {
+        return Err(Error::TooLarge { path: name.to_owned(), needed, limit: MAX_TABLE_BYTES });
+    }
+    Ok((name.display().to_string(), text))
 }
 
 /// Prints an error with its code and way out, and gives the exit code of its class.

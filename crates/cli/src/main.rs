@@ -15,7 +15,7 @@ use espalier_model::diagnose::Class;
 
 fn main() -> ExitCode {
     turn_panics_into_exit_code_1();
-    let arguments = match args::Arguments::try_parse() {
+    let arguments = match args::Arguments::try_parse_from(std::env::args_os().map(args::shield_point)) {
         Ok(arguments) => arguments.with_all_overrides(),
         Err(error) => {
             // Help and version are results, not errors; clap knows which is which.

@@ -60,7 +60,7 @@ fn help_teaches_and_succeeds() {
     assert_eq!(output.status.code(), Some(0));
     for command in [
         "run", "compare", "sweep", "phantom", "volume", "skeleton", "radius", "tree", "views", "embed",
-        "render", "verify", "profile",
+        "render", "verify", "profile", "locate",
     ] {
         assert!(text.contains(&format!("\n  {command} ")), "no {command} in: {text}");
     }

@@ -117,6 +117,22 @@ pub enum Error {
         /// How many there are.
         n_there: usize,
     },
+    /// A text that is no point.
+    #[error("{source_name}{cause}", source_name = source_name.as_ref().map(|name| format!("{name}: ")).unwrap_or_default())]
+    Point {
+        /// The file that has it; none for an argument.
+        source_name: Option<String>,
+        /// What is wrong.
+        cause: crate::locate::PointError,
+    },
+    /// Points in a space that a run does not have.
+    #[error("{option}: {why}")]
+    NoSuchSpace {
+        /// The option.
+        option: &'static str,
+        /// Why not.
+        why: &'static str,
+    },
     /// A stage that this input does not pass through was asked for.
     #[error("--{flag} {stage}: a run from this input has no such stage; it has {available}")]
     NoSuchStage {
@@ -250,6 +266,8 @@ impl Diagnose for Error {
             Self::Stage { cause, .. } | Self::File { cause, .. } => cause.code(),
             Self::MissingArtifact { .. } => "E-RUN-MISSING-FILE",
             Self::NoSuchPlace { .. } => "E-PROFILE-PLACE",
+            Self::Point { cause, .. } => cause.code(),
+            Self::NoSuchSpace { .. } => "E-LOCATE-SPACE",
             Self::NoRun { .. } => "E-COMPARE-NO-RUN",
             Self::RunInTheWay { .. } => "E-COMPARE-FOLDER",
             Self::Settled { .. } => "E-COMPARE-SETTINGS",
@@ -274,8 +292,10 @@ impl Diagnose for Error {
         match self {
             Self::Config(error) => error.class(),
             Self::Stage { cause, .. } | Self::File { cause, .. } => cause.class(),
+            Self::Point { cause, .. } => cause.class(),
             Self::NoSuchStage { .. }
             | Self::NoSuchPlace { .. }
+            | Self::NoSuchSpace { .. }
             | Self::EmptyRange { .. }
             | Self::Input { .. }
             | Self::OtherSettings { .. }
@@ -302,6 +322,8 @@ impl Diagnose for Error {
             Self::Unverified { .. } => "use none of it; make it again with espalier run".to_owned(),
             Self::Certificate { .. } => "make the embedding again with espalier embed".to_owned(),
             Self::NoSuchPlace { .. } => "branches.tsv has the branches, nodes.tsv the nodes".to_owned(),
+            Self::Point { cause, .. } => cause.hint(),
+            Self::NoSuchSpace { .. } => "give points in RAS+ mm, with --lps in LPS+ mm, or on the map in mm".to_owned(),
             Self::NoRun { .. } => "run it with this version, at least up to --to embed".to_owned(),
             Self::RunInTheWay { .. } => "choose another folder with -o".to_owned(),
             Self::NotSwept { .. } => "write --over KEY=V1,V2,…, such as --over embed.w_length=0.5,1,2,4".to_owned(),

@@ -12,6 +12,7 @@
 //! | the run folder: atomic files, digests, one lock | `folder` |
 //! | how a result came about, what each method cost | `provenance`, `methods` |
 //! | what the columns of the tables mean | `dictionary` |
+//! | a point of the scan on the map, and back | [`mod@locate`] |
 //! | the calibre on the way to a place | [`profile()`] |
 //! | a run folder held against itself | [`verify()`] |
 //!
@@ -28,6 +29,7 @@ mod dictionary;
 mod error;
 mod event;
 mod folder;
+pub mod locate;
 mod methods;
 mod phantom;
 mod profile;
@@ -47,6 +49,7 @@ pub use error::{Error, NotSwept};
 pub use espalier_verify::{Check, Outcome};
 pub use espalier_volume::is_dicom_folder;
 pub use event::Event;
+pub use locate::{Given, Located, Space, locate, read_point, read_points};
 pub use phantom::make_phantom;
 pub use profile::{WayTo, profile};
 pub use provenance::{input_of_run, side_file_of_run};

@@ -59,9 +59,9 @@ pub use chart::{Chart, Charts, charts};
 use coloring::Coloring;
 pub use convergence::{Searched, convergence};
 pub use error::Error;
-pub use map::{Beside, Place, PlanarMap, reach};
 use furniture::Heading;
 use kinship::Kinship;
+pub use map::{Beside, Place, PlanarMap, reach};
 use page::{Needs, Page, Pen};
 use palette::PageColors;
 pub use params::{ColorBy, Compass, Params, Style, Theme, Unit};
@@ -277,6 +277,8 @@ fn report(tree: &Tree, [map, global]: [&Sheet; 2], pixels: &[Pixel]) -> Report {
     report.count("width_px", page.width);
     report.count("height_px", page.height);
     report.count("mm_per_px", 1.0 / page.px_per_mm);
+    report.count("plane_origin_x_px", page.origin_px.x);
+    report.count("plane_origin_y_px", page.origin_px.y);
     let is_thin =
         |&(node, _): &(usize, usize)| scene.radii_mm[node] * page.px_per_mm < 0.5 * page.pen.min_width_px;
     report.count_usize("edges", tree.n_nodes() - 1);

@@ -138,7 +138,8 @@ impl Layout<'_> {
             shares.push(length);
             let before = edge(i - 1);
             let after = if i < last { edge(i) } else { before };
-            let middle = ((before.0 + after.0).normalize_or(after.0), (before.1 + after.1).normalize_or(after.1));
+            let middle =
+                ((before.0 + after.0).normalize_or(after.0), (before.1 + after.1).normalize_or(after.1));
             directions.push(middle);
             normals.push(turned(normal, before.1, middle.1));
             if i < last {
@@ -205,6 +206,7 @@ fn across(direction: DVec3, along: DVec3) -> DVec3 {
 fn turned(direction: DVec3, from: DVec3, to: DVec3) -> DVec3 {
     let cos = from.dot(to);
     // On a fold back there is no smallest rotation.
-    let turned = if cos > -0.999 { direction - (from + to) * (direction.dot(to) / (1.0 + cos)) } else { direction };
+    let turned =
+        if cos > -0.999 { direction - (from + to) * (direction.dot(to) / (1.0 + cos)) } else { direction };
     across(turned, to)
 }

@@ -10,7 +10,7 @@
 //! Frames of nodes come from `frames`; between them F is the normalised mean of their quaternions, so that the map goes
 //! on without a jump from edge to edge of a branch.
 //! **Which edge** inside of tubes the one whose surface is highest there, as drawn; outside the one whose outline is
-//! nearest: [`reach`].
+//! nearest: [`reach`]. A point on a centreline belongs to it also where another tube covers it.
 //! **Guarantees** points on the centreline are exact, both ways; lengths across are true; the result is a function of
 //! tree and layout alone.
 //! **Cost** O(1) a point whose edge is known, O(edges) to find it.
@@ -18,8 +18,11 @@
 mod frames;
 
 use espalier_geom::{plane, space};
-use espalier_model::Tree;
+use espalier_model::{Embedding, Tree, ViewHierarchy};
 use glam::{DQuat, DVec2, DVec3};
+
+/// What counts as on the centreline where no layout says to what its numbers are rounded, mm.
+const ON_CENTER_MM: f64 = 1e-6;
 
 /// The map of an embedded tree.
 #[derive(Clone, Debug)]
@@ -27,6 +30,8 @@ pub struct PlanarMap<'a> {
     tree: &'a Tree,
     positions_mm: &'a [DVec2],
     frames: Vec<DQuat>,
+    /// Points as near to a centreline belong to it, whatever tube else they lie in.
+    on_center_mm: f64,
 }
 
 /// A place on the centreline.
@@ -61,7 +66,16 @@ impl<'a> PlanarMap<'a> {
     pub fn new(tree: &'a Tree, positions_mm: &'a [DVec2], to_viewer: DVec3) -> Self {
         assert_eq!(positions_mm.len(), tree.n_nodes(), "one position for each node");
         let frames = frames::frames(tree, positions_mm, to_viewer);
-        Self { tree, positions_mm, frames }
+        Self { tree, positions_mm, frames, on_center_mm: ON_CENTER_MM }
+    }
+
+    /// The map of an embedded tree; a straight tree shows the side that the global view sees.
+    #[must_use]
+    pub fn of(tree: &'a Tree, embedding: &'a Embedding, views: &ViewHierarchy) -> Self {
+        let to_viewer = views.global.towards_camera;
+        let is_reflected = embedding.pose.is_reflected;
+        let to_viewer = if is_reflected { -to_viewer } else { to_viewer };
+        Self { on_center_mm: embedding.quantum_mm, ..Self::new(tree, &embedding.positions_mm, to_viewer) }
     }
 
     /// What a point of the plane stands for, as a point that belongs to the edge above `node`.
@@ -87,7 +101,7 @@ impl<'a> PlanarMap<'a> {
     pub fn owner_in_plane(&self, plane_mm: DVec2) -> usize {
         self.owner(|node| {
             let place = self.foot_in_plane(node, plane_mm);
-            reach(plane_mm.distance(self.plane_at(place)), self.radius_mm(place))
+            self.reach(plane_mm.distance(self.plane_at(place)), place)
         })
     }
 
@@ -96,7 +110,7 @@ impl<'a> PlanarMap<'a> {
     pub fn owner_in_patient(&self, patient_mm: DVec3) -> usize {
         self.owner(|node| {
             let place = self.foot_in_patient(node, patient_mm);
-            reach(patient_mm.distance(self.patient_at(place)), self.radius_mm(place))
+            self.reach(patient_mm.distance(self.patient_at(place)), place)
         })
     }
 
@@ -143,6 +157,10 @@ impl<'a> PlanarMap<'a> {
         let (from, to) = self.ends(node);
         let (a, b) = (self.tree.position_mm(from), self.tree.position_mm(to));
         Place { node, share: space::nearest_parameter(point_mm, a, b) }
+    }
+
+    fn reach(&self, distance: f64, place: Place) -> f64 {
+        if distance <= self.on_center_mm { f64::NEG_INFINITY } else { reach(distance, self.radius_mm(place)) }
     }
 
     /// The edge with the least `reach`; of equal ones the first.

@@ -20,7 +20,12 @@ fn tilted(points: &[(f64, f64, Option<usize>)]) -> (Tree, Vec<DVec2>, DVec3, DVe
         kind: 0,
     };
     let nodes: Vec<Node> = points.iter().map(at).collect();
-    (Tree::new(&nodes).expect("a tree"), points.iter().map(|&(u, v, _)| DVec2::new(u, v)).collect(), right, up)
+    (
+        Tree::new(&nodes).expect("a tree"),
+        points.iter().map(|&(u, v, _)| DVec2::new(u, v)).collect(),
+        right,
+        up,
+    )
 }
 
 const FLAT: [(f64, f64, Option<usize>); 8] = [
@@ -64,7 +69,8 @@ fn a_reflected_picture_is_the_same_plane_from_behind() {
 
 /// A branch between two forks whose planes are at right angles.
 fn twisted() -> (Tree, Vec<DVec2>) {
-    let mut nodes = vec![node(-8.0, 0.0, 9.0, None), node(0.0, 0.0, 0.0, Some(0)), node(8.0, 0.0, 9.0, Some(1))];
+    let mut nodes =
+        vec![node(-8.0, 0.0, 9.0, None), node(0.0, 0.0, 0.0, Some(0)), node(8.0, 0.0, 9.0, Some(1))];
     let mut flat = vec![DVec2::new(-8.0, 9.0), DVec2::ZERO, DVec2::new(8.0, 9.0)];
     for i in 1..=10 {
         nodes.push(node(0.0, 0.0, -3.0 * f64::from(i), Some(if i == 1 { 1 } else { nodes.len() - 1 })));
@@ -123,7 +129,12 @@ fn trees_without_a_plane_have_a_map_all_the_same() {
         vec![node(1.0, 2.0, 3.0, None)],
         vec![node(0.0, 0.0, 0.0, None), node(0.0, 9.0, 0.0, Some(0))],
         // A fork whose branches leave in line, and a fold back.
-        vec![node(0.0, 0.0, 0.0, None), node(0.0, 0.0, -9.0, Some(0)), node(0.0, 0.0, -18.0, Some(1)), node(0.0, 0.0, -19.0, Some(1))],
+        vec![
+            node(0.0, 0.0, 0.0, None),
+            node(0.0, 0.0, -9.0, Some(0)),
+            node(0.0, 0.0, -18.0, Some(1)),
+            node(0.0, 0.0, -19.0, Some(1)),
+        ],
         vec![node(0.0, 0.0, 0.0, None), node(0.0, 0.0, -9.0, Some(0)), node(0.0, 0.0, -1.0, Some(1))],
     ] {
         let tree = Tree::new(&points).expect("a tree");
