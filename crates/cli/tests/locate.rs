@@ -59,7 +59,8 @@ fn every_node_is_where_the_layout_has_it_and_back() {
     let folder = run_of_y();
     let nodes = nodes(folder.path());
     let table = |columns: &[usize]| {
-        let row = |node: &Vec<f64>| columns.iter().map(|&i| node[i].to_string()).collect::<Vec<_>>().join("\t");
+        let row =
+            |node: &Vec<f64>| columns.iter().map(|&i| node[i].to_string()).collect::<Vec<_>>().join("\t");
         "# nodes\n".to_owned() + &nodes.iter().map(row).collect::<Vec<_>>().join("\n")
     };
     for (file, columns) in [("in-space.tsv", [2, 3, 4].as_slice()), ("on-map.tsv", &[6, 7])] {
@@ -67,7 +68,8 @@ fn every_node_is_where_the_layout_has_it_and_back() {
         let points = points_of(folder.path(), &["--from", file]);
         assert_eq!(points.len(), nodes.len());
         for (point, node) in points.iter().zip(&nodes) {
-            let expected = [("x_mm", 2), ("y_mm", 3), ("z_mm", 4), ("u_mm", 6), ("v_mm", 7), ("radius_mm", 5)];
+            let expected =
+                [("x_mm", 2), ("y_mm", 3), ("z_mm", 4), ("u_mm", 6), ("v_mm", 7), ("radius_mm", 5)];
             for (name, column) in expected {
                 let found = number(point, name);
                 assert!((found - node[column]).abs() < 2e-4, "{file} {name}: {found} {node:?}");
@@ -89,7 +91,9 @@ fn spaces_are_the_same_point_under_other_names() {
     let ras = &points_of(folder.path(), &[&aside])[0];
     let same = |arguments: &[&str]| {
         let other = &points_of(folder.path(), arguments)[0];
-        for name in ["x_mm", "y_mm", "z_mm", "u_mm", "v_mm", "pixel_x", "branch", "from_root_mm", "off_center_mm"] {
+        for name in
+            ["x_mm", "y_mm", "z_mm", "u_mm", "v_mm", "pixel_x", "branch", "from_root_mm", "off_center_mm"]
+        {
             let (a, b) = (number(ras, name), number(other, name));
             // Voxels and pixels are written with two decimals.
             assert!((a - b).abs() < 0.02, "{arguments:?} {name} {a} {b}");
@@ -99,7 +103,9 @@ fn spaces_are_the_same_point_under_other_names() {
     same(&[&format!("{},{},{}", -(x + 0.4), -(y - 0.3), z), "--lps"]);
     same(&[&format!("{},{},{}", ras["i"], ras["j"], ras["k"]), "--voxel"]);
     // On the map the same point, but for what it lies off the surface that the map shows.
-    for (arguments, names) in [(["--json"].as_slice(), ["u_mm", "v_mm"]), (&["--pixel"], ["pixel_x", "pixel_y"])] {
+    for (arguments, names) in
+        [(["--json"].as_slice(), ["u_mm", "v_mm"]), (&["--pixel"], ["pixel_x", "pixel_y"])]
+    {
         let given = format!("{},{}", ras[names[0]], ras[names[1]]);
         let run = [&["locate", "run", &given], arguments, &["--json"]].concat();
         let json = if arguments == ["--json"] { &run[..4] } else { &run[..] };
@@ -121,7 +127,10 @@ fn what_is_outside_is_said_to_be() {
     let text = text_of(folder.path(), &["locate", "run", "-900.5,0"]);
     assert!(text.contains("outside") && text.contains("plane mm") && text.contains("u_mm"), "{text}");
     let text = text_of(folder.path(), &["locate", "run", "0,0,0", "1,1"]);
-    assert_eq!((text.lines().count(), text.lines().next().map(|line| line.starts_with("given\t"))), (3, Some(true)));
+    assert_eq!(
+        (text.lines().count(), text.lines().next().map(|line| line.starts_with("given\t"))),
+        (3, Some(true))
+    );
 }
 
 #[test]

@@ -19,7 +19,7 @@
 //! **Cost** O(nodes).
 
 use espalier_geom::{math, space};
-use espalier_model::{Branch, Tree};
+use espalier_model::Tree;
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 /// Where the sine of the directions' spread is less than about this squared, as at a fork of 7°, they tell no plane.
@@ -35,7 +35,7 @@ pub(super) fn frames(tree: &Tree, positions_mm: &[DVec2], to_viewer: DVec3) -> V
     // 1. Forks, from their own branches.
     let mut is_known = vec![false; tree.n_nodes()];
     for fork in (0..tree.n_nodes()).filter(|&node| tree.children(node).len() > 1) {
-        if let Some(frame) = layout.fork(fork, branches) {
+        if let Some(frame) = layout.fork(fork) {
             (frames[fork], is_known[fork]) = (frame, true);
         }
     }
@@ -85,7 +85,7 @@ struct Carried {
 
 impl Layout<'_> {
     /// The frame of a fork; none where its branches are too much in line.
-    fn fork(&self, fork: usize, branches: &[Branch]) -> Option<DQuat> {
+    fn fork(&self, fork: usize) -> Option<DQuat> {
         let reach_mm = self.tree.nodes()[fork].radius_mm;
         let mut chords: Vec<(DVec2, DVec3)> = Vec::new();
         // Backwards to the parent: both ends of both directions turn over, so their product stays.
@@ -98,7 +98,6 @@ impl Layout<'_> {
             };
             chords.extend(self.chord(fork, reach_mm, only_child));
         }
-        debug_assert!(!branches.is_empty(), "a fork has branches");
         polar(&chords)
     }
 
@@ -133,8 +132,8 @@ impl Layout<'_> {
         let mut normal = across(start, edge(0).1);
         let (mut directions, mut normals) = (vec![edge(0)], vec![normal]);
         let (mut length, mut shares) = (0.0, vec![0.0]);
-        for i in 1..=last {
-            length += self.tree.edge_length_mm(chain[i]);
+        for (i, &node) in chain.iter().enumerate().skip(1) {
+            length += self.tree.edge_length_mm(node);
             shares.push(length);
             let before = edge(i - 1);
             let after = if i < last { edge(i) } else { before };
@@ -179,8 +178,7 @@ fn polar(chords: &[(DVec2, DVec3)]) -> Option<DQuat> {
     // AᵀA and its square root: (G + √det G · 1) / √(tr G + 2 √det G).
     let (p, q, r) = (a.length_squared(), a.dot(b), b.length_squared());
     let (det, trace) = (p * r - q * q, p + r);
-    // Written so that a NaN is refused too.
-    if !(det > LEAST_SPREAD * trace * trace) {
+    if det.is_nan() || det <= LEAST_SPREAD * trace * trace {
         return None;
     }
     let root = det.sqrt();
