@@ -277,8 +277,6 @@ fn report(tree: &Tree, [map, global]: [&Sheet; 2], pixels: &[Pixel]) -> Report {
     report.count("width_px", page.width);
     report.count("height_px", page.height);
     report.count("mm_per_px", 1.0 / page.px_per_mm);
-    report.count("plane_origin_x_px", page.origin_px.x);
-    report.count("plane_origin_y_px", page.origin_px.y);
     let is_thin =
         |&(node, _): &(usize, usize)| scene.radii_mm[node] * page.px_per_mm < 0.5 * page.pen.min_width_px;
     report.count_usize("edges", tree.n_nodes() - 1);

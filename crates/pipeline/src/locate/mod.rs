@@ -27,6 +27,9 @@ use crate::run::boxed;
 use crate::stage::{Artifact, Stage};
 
 const BRANCHES: &str = "branches.tsv";
+const PICTURE: &str = "planar.exr";
+/// The comment stands in the header, of less than a kilobyte.
+const HEADER_BYTES: usize = 1 << 14;
 
 /// Finds points of a run on both sides.
 ///
@@ -74,8 +77,7 @@ impl Opened {
             ViewHierarchy::from_json(&text(file)?, &tree).map_err(|e| Error::file(&named(file), e))?;
         let has = |file: &str| folder.join(file).is_file();
         let labels = if has(BRANCHES) { answer::labels(&text(BRANCHES)?) } else { Vec::new() };
-        let report = format!("{}/report.json", Stage::Render.folder());
-        let picture = if has(&report) { Picture::of(&text(&report)?) } else { None };
+        let picture = if has(PICTURE) { Picture::of(&run.read(PICTURE)?) } else { None };
         let mask = read_mask(&run, max_bytes)?;
         let mut arc_mm = vec![0.0; tree.n_nodes()];
         for (node, parent) in tree.edges() {
@@ -144,7 +146,10 @@ impl Opened {
 }
 
 fn no_picture() -> Error {
-    Error::NoSuchSpace { option: "--pixel", why: "this run has no planar.png whose scale is known" }
+    Error::NoSuchSpace {
+        option: "--pixel",
+        why: "this run has no planar.exr, which has the scale of its planar.png",
+    }
 }
 
 /// The mask of a run; none where it began with a traced tree.
@@ -162,12 +167,17 @@ fn read_mask(run: &RunFolder, max_bytes: u64) -> Result<Option<Mask>, Error> {
 }
 
 impl Picture {
-    /// From the counts in the render stage's report; none where an older version wrote it.
-    fn of(report: &str) -> Option<Self> {
-        let report: serde_json::Value = serde_json::from_str(report).ok()?;
-        let count = |name: &str| report.get("counts")?.get(name)?.as_f64();
-        let origin_px = DVec2::new(count("plane_origin_x_px")?, count("plane_origin_y_px")?);
-        Some(Self { mm_per_px: count("mm_per_px")?, origin_px })
+    /// From the comment in the header of the map's EXR, which has the pixels of its PNG; none where it has none.
+    fn of(exr: &[u8]) -> Option<Self> {
+        let header = String::from_utf8_lossy(&exr[..exr.len().min(HEADER_BYTES)]);
+        let after = |text: &str| header.split_once(text).map(|(_, rest)| rest.to_owned());
+        let number = |text: &str| -> Option<f64> {
+            text.split([' ', ')', ',', ';']).find(|word| !word.is_empty())?.parse().ok()
+        };
+        let across = after("plane_x_mm = (x + 0.5 - ")?;
+        let origin_px = DVec2::new(number(&across)?, number(&after("plane_y_mm = (")?)?);
+        let mm_per_px = number(across.split_once("* ")?.1)?;
+        Some(Self { mm_per_px, origin_px }).filter(|_| mm_per_px > 0.0 && origin_px.is_finite())
     }
 
     /// The plane at a pixel counted from 0 at the picture's upper left corner; whole numbers are centres of pixels.
