@@ -72,6 +72,34 @@ fn a_y_is_measured_and_its_voxels_shared_out() {
     }
 }
 
+#[test]
+fn the_distance_of_every_voxel_is_written_when_asked_for() {
+    let out = tempfile::tempdir().expect("a folder");
+    let path = out.path().join("stages/03-radius/distance.nii.gz");
+    tree_run(&fixture("y.nii.gz"), out.path(), &[]);
+    assert!(!path.exists());
+    tree_run(&fixture("y.nii.gz"), out.path(), &[set("radius.field", true)]);
+    let file = out.path().join("stages/01-volume/mask.nii.gz");
+    let volume = espalier_volume::read(&file, &ReadOptions::default()).expect("a mask").volume;
+    let inside = volume.map_values(|value| value != 0.0);
+    let mask = Mask::from_voxels(volume.grid().clone(), &inside);
+    let (grid, spacing) = (mask.grid(), mask.grid().spacing_mm());
+    let place = |index: usize| DVec3::from_array(grid.voxel(index).map(|c| c as f64)) * spacing;
+    let background: Vec<DVec3> = (0..grid.n_voxels()).filter(|&i| !inside[i]).map(place).collect();
+    for (index, distance) in voxels(&path).into_iter().enumerate() {
+        if !inside[index] {
+            assert_eq!(distance, 0.0);
+        } else if index % 29 == 0 {
+            let nearest = background.iter().map(|site| site.distance_squared(place(index)));
+            let expected = nearest.fold(f64::INFINITY, f64::min).sqrt();
+            assert!((distance - expected).abs() < 1e-5, "{distance}, not {expected}");
+        }
+    }
+    // The memory that it may take is a limit like any other.
+    let error = espalier_radius::distance_field_within(&mask, 1000).expect_err("too large");
+    assert_eq!((error.code(), error.class()), ("E-RADIUS-FIELD-TOO-LARGE", Class::Limit));
+}
+
 /// A straight vessel along z whose radius falls from 4 mm to a narrow place in its middle, 4 mm long, and recovers.
 fn narrowed(radius_mm: f64) -> Mask {
     let share = |z: f64| (1.0 - ((z - 30.0).abs() - 2.0).max(0.0) / 6.0).max(0.0);

@@ -19,6 +19,7 @@ use crate::diagnose::{Class, Diagnose};
 use crate::{Grid, GridError, Mask, Skeleton, Volume, Voxels};
 
 const HEADER_BYTES: usize = 352;
+const F32_BYTES: usize = size_of::<f32>();
 /// Extents are 16-bit signed integers.
 const MAX_EXTENT: usize = i16::MAX as usize;
 /// zlib's own default; the levels above cost time and win little on masks.
@@ -177,13 +178,47 @@ fn labels_as<const N: usize>(
     file.finish()
 }
 
-/// Single-precision values on a grid, x fastest, such as radii in mm on skeleton voxels.
+/// A single-precision value for each voxel of a skeleton, such as radii in mm; 0 elsewhere.
 ///
 /// # Errors
-/// [`NiftiOutError`] if the grid does not fit the format or the values do not fit the grid.
-pub fn scalars(grid: &Grid, values: &[f32]) -> Result<Vec<u8>, NiftiOutError> {
-    let mut file = File::new(grid, Scalar::F32, (1.0, 0.0), "espalier scalars 1")?;
-    file.planes(values, |value| value.to_le_bytes())?;
+/// [`NiftiOutError`] if the grid does not fit the format or the values do not fit the skeleton.
+pub fn skeleton_scalars(skeleton: &Skeleton, values: &[f32]) -> Result<Vec<u8>, NiftiOutError> {
+    let n_voxels = skeleton.voxels().len();
+    if values.len() != n_voxels {
+        return Err(NiftiOutError::Length { n_values: values.len(), n_voxels });
+    }
+    let [nx, ny, nz] = skeleton.grid().shape();
+    let mut file = File::new(skeleton.grid(), Scalar::F32, (1.0, 0.0), "espalier scalars 1")?;
+    let mut plane = vec![0_u8; nx * ny * F32_BYTES];
+    let mut rest = skeleton.voxels().iter().zip(values).peekable();
+    for z in 0..nz {
+        plane.fill(0);
+        // The voxels are sorted by z.
+        while let Some((&[x, y, _], value)) = rest.next_if(|(voxel, _)| voxel[2] as usize == z) {
+            let place = (y as usize * nx + x as usize) * F32_BYTES;
+            plane[place..place + F32_BYTES].copy_from_slice(&value.to_le_bytes());
+        }
+        file.gz.write_all(&plane)?;
+    }
+    file.finish()
+}
+
+/// A single-precision value for each foreground voxel of a mask, such as its distance in mm; 0 elsewhere.
+///
+/// # Errors
+/// [`NiftiOutError`] if the grid does not fit the format.
+pub fn mask_scalars(mask: &Mask, value_at: impl Fn([usize; 3]) -> f32) -> Result<Vec<u8>, NiftiOutError> {
+    let mut file = File::new(mask.grid(), Scalar::F32, (1.0, 0.0), "espalier scalars 1")?;
+    let [nx, ny, nz] = mask.grid().shape();
+    let mut plane = vec![0_u8; nx * ny * F32_BYTES];
+    for z in 0..nz {
+        plane.fill(0);
+        for (y, x) in (0..ny).flat_map(|y| mask.bits().runs(z * ny + y).flatten().map(move |x| (y, x))) {
+            let place = (y * nx + x) * F32_BYTES;
+            plane[place..place + F32_BYTES].copy_from_slice(&value_at([x, y, z]).to_le_bytes());
+        }
+        file.gz.write_all(&plane)?;
+    }
     file.finish()
 }
 

@@ -109,7 +109,7 @@ impl Stage {
             Self::Phantom => &["ct.nii.gz", "truth-mask.nii.gz", "truth.swc"],
             Self::Volume => &["mask.nii.gz", "dropped.tsv"],
             Self::Skeleton => &["skeleton.nii.gz"],
-            Self::Radius => &["radius.nii.gz", "spheres.tsv"],
+            Self::Radius => &["radius.nii.gz", "distance.nii.gz", "spheres.tsv"],
             Self::Tree => &[
                 "/tree.swc",
                 "/tree.vtp",

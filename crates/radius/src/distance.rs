@@ -18,6 +18,8 @@ use espalier_model::Mask;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use crate::Error;
+
 /// Runs that one task takes: enough to hide its start, few enough to share out.
 const RUNS_PER_TASK: usize = 1024;
 
@@ -44,13 +46,8 @@ pub struct DistanceField {
 /// ```
 #[must_use]
 pub fn distance_field(mask: &Mask) -> DistanceField {
-    let grid = mask.grid();
-    let spacing_mm = grid.spacing_mm();
-    let Some((first, last)) = mask.bounding_box() else {
-        return DistanceField { low: [0; 3], shape: [0; 3], spacing_mm, squared: Vec::new() };
-    };
-    let low = first.map(|c| c.saturating_sub(1));
-    let shape = [0, 1, 2].map(|axis| (last[axis] + 2).min(grid.shape()[axis]) - low[axis]);
+    let spacing_mm = mask.grid().spacing_mm();
+    let (low, shape) = box_of(mask);
     let squared = vec![0.0; shape[0] * shape[1] * shape[2]];
     let mut field = DistanceField { low, shape, spacing_mm, squared };
 
@@ -62,6 +59,29 @@ pub fn distance_field(mask: &Mask) -> DistanceField {
         field.take_in(axis, &foreground);
     }
     field
+}
+
+/// [`distance_field`], where it may take so many bytes of memory.
+///
+/// # Errors
+/// [`Error::FieldTooLarge`] if it needs more.
+pub fn distance_field_within(mask: &Mask, max_bytes: u64) -> Result<DistanceField, Error> {
+    let (_, shape) = box_of(mask);
+    let bytes_each = size_of::<f64>() as u64;
+    let needed = shape.iter().fold(bytes_each, |product, &extent| product.saturating_mul(extent as u64));
+    if needed > max_bytes {
+        Err(Error::FieldTooLarge { needed, limit: max_bytes })
+    } else {
+        Ok(distance_field(mask))
+    }
+}
+
+/// First voxel and extents of the box that is held; no voxel of an empty mask.
+fn box_of(mask: &Mask) -> ([usize; 3], [usize; 3]) {
+    let Some((first, last)) = mask.bounding_box() else { return ([0; 3], [0; 3]) };
+    let low = first.map(|c| c.saturating_sub(1));
+    let shape = [0, 1, 2].map(|axis| (last[axis] + 2).min(mask.grid().shape()[axis]) - low[axis]);
+    (low, shape)
 }
 
 impl DistanceField {

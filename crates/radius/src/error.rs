@@ -27,6 +27,14 @@ pub enum Error {
         /// The first such voxel (x, y, z).
         voxel: [u32; 3],
     },
+    /// The distances of all voxels need more memory than allowed.
+    #[error("the distances of all voxels need {needed} bytes of memory, allowed are {limit}")]
+    FieldTooLarge {
+        /// How many bytes are needed.
+        needed: u64,
+        /// How many are allowed.
+        limit: u64,
+    },
 }
 
 impl Diagnose for Error {
@@ -35,11 +43,15 @@ impl Diagnose for Error {
             Self::GridMismatch { .. } => "E-RADIUS-GRID",
             Self::EmptySkeleton => "E-RADIUS-EMPTY",
             Self::OutsideMask { .. } => "E-RADIUS-OUTSIDE-MASK",
+            Self::FieldTooLarge { .. } => "E-RADIUS-FIELD-TOO-LARGE",
         }
     }
 
     fn class(&self) -> Class {
-        Class::Input
+        match self {
+            Self::FieldTooLarge { .. } => Class::Limit,
+            Self::GridMismatch { .. } | Self::EmptySkeleton | Self::OutsideMask { .. } => Class::Input,
+        }
     }
 
     fn hint(&self) -> String {
@@ -47,6 +59,7 @@ impl Diagnose for Error {
             Self::GridMismatch { .. } | Self::OutsideMask { .. } => {
                 "give the mask that the skeleton was thinned from".to_owned()
             }
+            Self::FieldTooLarge { .. } => "raise --max-memory, or leave radius.field off".to_owned(),
             Self::EmptySkeleton => "thin with thinning = \"safe\", which lets nothing vanish".to_owned(),
         }
     }

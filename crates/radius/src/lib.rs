@@ -26,7 +26,7 @@ use espalier_model::{InscribedSpheres, Mask, Report, Skeleton, Sphere};
 use glam::DVec3;
 use rayon::prelude::*;
 
-pub use distance::{DistanceField, distance_field};
+pub use distance::{DistanceField, distance_field, distance_field_within};
 pub use error::Error;
 pub use params::{Params, Rule};
 

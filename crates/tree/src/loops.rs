@@ -12,6 +12,7 @@
 //! **Cost** O(P log P + N) in pieces and samples.
 
 use espalier_geom::union_find::UnionFind;
+use espalier_model::table::fixed;
 use espalier_model::{Ledger, LedgerEntry, LedgerKind};
 
 use crate::Error;
@@ -40,15 +41,16 @@ pub(crate) fn open(graph: &mut Graph, params: &Params, ledger: &mut Ledger) -> R
         let polyline = graph.polyline(piece);
         let edge = thinnest_edge(&polyline);
         let place = middle_of_edge(&polyline, edge);
-        let (before, after) =
-            (polyline_length_mm(&polyline[..=edge]), polyline_length_mm(&polyline[edge + 1..]));
+        // A stub of one sample is 0 mm long, not −0.
+        let stubs = [&polyline[..=edge], &polyline[edge + 1..]];
+        let [before, after] = stubs.map(|stub| fixed(polyline_length_mm(stub), 3));
         ledger.0.push(LedgerEntry {
             kind: LedgerKind::LoopCut,
             position_mm: place.position_mm,
             radius_mm: place.radius_mm,
             length_mm: polyline[edge].position_mm.distance(polyline[edge + 1].position_mm),
             reason: format!(
-                "thinnest place on its loop, radius {:.3} mm; stubs of {before:.3} and {after:.3} mm remain",
+                "thinnest place on its loop, radius {:.3} mm; stubs of {before} and {after} mm remain",
                 place.radius_mm
             ),
         });

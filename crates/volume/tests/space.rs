@@ -316,14 +316,16 @@ fn every_kind_of_output_comes_back() {
     let expected: Vec<f64> = (0..24).map(|i| f64::from(u8::from(is_set(i)))).collect();
     assert_eq!(read_values(nifti_out::mask(&mask).expect("fits")), expected);
     let voxels = (0..24).filter(|&i| is_set(i)).map(|i| grid.voxel(i).map(|v| v as u32)).collect();
-    assert_eq!(
-        read_values(nifti_out::skeleton(&Skeleton::new(grid.clone(), voxels)).expect("fits")),
-        expected
-    );
-    let floats: Vec<f32> = (0..24_u8).map(|i| f32::from(i) / 7.0).collect();
-    let expected: Vec<f64> = floats.iter().map(|&v| f64::from(v)).collect();
-    assert_eq!(read_values(nifti_out::scalars(&grid, &floats).expect("fits")), expected);
-    assert_eq!(nifti_out::scalars(&grid, &floats[1..]).expect_err("too few").code(), "E-NIFTI-OUT-LENGTH");
+    let skeleton = Skeleton::new(grid.clone(), voxels);
+    assert_eq!(read_values(nifti_out::skeleton(&skeleton).expect("fits")), expected);
+    let value = |i: usize| i as f32 / 7.0;
+    let expected: Vec<f64> = (0..24).map(|i| if is_set(i) { f64::from(value(i)) } else { 0.0 }).collect();
+    let of_mask = nifti_out::mask_scalars(&mask, |voxel| value(grid.index(voxel))).expect("fits");
+    assert_eq!(read_values(of_mask), expected);
+    let floats: Vec<f32> = (0..24).filter(|&i| is_set(i)).map(value).collect();
+    assert_eq!(read_values(nifti_out::skeleton_scalars(&skeleton, &floats).expect("fits")), expected);
+    let too_few = nifti_out::skeleton_scalars(&skeleton, &floats[1..]).expect_err("too few");
+    assert_eq!(too_few.code(), "E-NIFTI-OUT-LENGTH");
     let labels: Vec<u32> = (0..24).map(|i| i * 100_000_000).collect();
     let expected: Vec<f64> = labels.iter().map(|&v| f64::from(v)).collect();
     let [nx, ny, nz] = grid.shape();
