@@ -149,8 +149,14 @@ fn clean_within(mask: Mask, params: &Params, max_bytes: u64) -> Result<Segmented
     let mut report = Report::default();
     // What follows settles ties by storage order, here and in the later stages.
     let stored_orientation = mask.grid().orientation();
+    let file_axes = mask.grid().nearest_world_axes();
     let mut mask = in_order(mask, params.orientation)?;
     if let Some(spacing) = params.resample_mm {
+        // It is meant along the file's own axes, which may be others now.
+        let spacing = match params.orientation {
+            Orientation::Ras => spacing.turned(file_axes.map(|(world_axis, _)| world_axis)),
+            Orientation::Stored => spacing,
+        };
         // The new grid has an origin of its own.
         mask = in_order(resample::mask(mask, spacing, max_bytes, &mut report)?, params.orientation)?;
     }

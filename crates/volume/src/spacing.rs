@@ -29,6 +29,16 @@ impl Spacing {
     }
 }
 
+impl Spacing {
+    /// The same once each axis has gone to the place that `places` has for it.
+    pub(crate) fn turned(self, places: [usize; 3]) -> Self {
+        let Self::Each(mm) = self else { return self };
+        let mut turned = mm;
+        places.into_iter().zip(mm).for_each(|(place, mm)| turned[place] = mm);
+        Self::Each(turned)
+    }
+}
+
 impl Serialize for Spacing {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {

@@ -3,7 +3,7 @@
 
 use espalier_model::{Diagnose, Grid, Mask, Volume, Voxels};
 use espalier_volume::{Method, Params, Segmented, Spacing, clean, segment};
-use glam::{DVec2, DVec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3};
 use ndarray::Array3;
 
 fn grid(shape: [usize; 3], spacing_mm: DVec3) -> Grid {
@@ -121,4 +121,17 @@ fn what_is_too_much_or_illegal_is_refused() {
     for wrong in ["\"fine\"", "[1, 2]", "[1, 2, 3, 4]", "true"] {
         assert!(parse(wrong).is_err(), "{wrong}");
     }
+}
+
+/// The spacing of each axis is that of the file's, though the mask's are turned to right, anterior, superior.
+#[test]
+fn each_spacing_is_along_the_files_own_axes() {
+    // x of the file goes up, y to the left, z to the front.
+    let axes = DMat3::from_cols(DVec3::Z * 2.0, DVec3::NEG_X * 3.0, DVec3::Y);
+    let grid = Grid::new([8, 6, 12], DAffine3::from_mat3(axes)).expect("legal");
+    let mask = Mask::from_fn(grid, |_| true);
+    let turned = done(clean(mask, &at(Spacing::Each([1.0, 1.5, 0.5]))));
+    let grid = turned.mask.grid();
+    assert!((grid.spacing_mm() - DVec3::new(1.5, 0.5, 1.0)).length() < 1e-6, "{}", grid.spacing_mm());
+    assert_eq!((grid.shape(), grid.orientation().as_str()), ([12, 24, 16], "RAS"));
 }
