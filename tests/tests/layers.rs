@@ -19,6 +19,7 @@ const LAYERS: &[(&str, u32)] = &[
     ("espalier-render", 2),
     ("espalier-phantom", 2),
     ("espalier-verify", 2),
+    ("espalier-report", 2),
     ("espalier-pipeline", 3),
     ("espalier-cli", 4),
 ];

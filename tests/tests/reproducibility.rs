@@ -79,6 +79,7 @@ fn a_run_from_the_middle_equals_one_from_the_start() {
         Stage::Views,
         Stage::Embed,
         Stage::Render,
+        Stage::Report,
     ] {
         let again = run_from(&config, folder.path(), &quick(), from).expect("a run");
         assert_eq!(again.digest, whole, "from {from}");

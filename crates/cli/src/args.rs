@@ -133,6 +133,8 @@ pub(crate) enum Command {
     Embed(StageArguments),
     /// Pictures:  espalier render TREE VIEWS EMBEDDING -o DIR
     Render(StageArguments),
+    /// The page of a run, report.html:  espalier report RUN
+    Report(StageArguments),
     /// Check a run folder: digests, certificate, and every number computed again:  espalier verify RUN
     Verify(VerifyArguments),
     /// The calibre on the way from the root to a place of a run:  espalier profile RUN --node N

@@ -38,6 +38,7 @@ pub(crate) fn execute(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Views(stage) => run_stage(arguments, stage, Stage::Views)?,
         Command::Embed(stage) => run_stage(arguments, stage, Stage::Embed)?,
         Command::Render(stage) => run_stage(arguments, stage, Stage::Render)?,
+        Command::Report(stage) => run_stage(arguments, stage, Stage::Report)?,
         Command::Verify(verify) => return verify_folder(arguments, verify),
         Command::Profile(profile) => return print_profile(profile),
         Command::Locate(locate) => return print_located(arguments, locate),

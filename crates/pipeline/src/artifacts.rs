@@ -9,7 +9,7 @@ use std::sync::Arc;
 use espalier_model::swc::{self, Traced};
 use espalier_model::{
     Comparison, Diagnose, Edits, Embedding, InscribedSpheres, Ledger, Mask, Report, Skeleton, Tree,
-    ViewHierarchy,
+    ViewHierarchy, Volume,
 };
 use espalier_model::{label_table, polydata};
 use espalier_tree::LabelMap;
@@ -100,6 +100,12 @@ impl Artifacts {
 
     fn label_names(&self, path: &Path) -> Result<BTreeMap<i64, String>, Error> {
         label_table::parse_names(&self.read_text(path)?).map_err(|error| Error::file(path, error))
+    }
+
+    /// The scan itself, as it was read for the mask.
+    pub(crate) fn scan(&mut self, lookup: Lookup<'_>) -> Result<Volume, Error> {
+        let path = self.locate(Artifact::Volume, lookup)?;
+        self.read_volume(&path, lookup.stage).map(|loaded| loaded.volume)
     }
 
     /// The traced tree, with what its reader had to say.

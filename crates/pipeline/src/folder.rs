@@ -132,6 +132,21 @@ impl RunFolder {
         self.check(relative, &bytes).map(|()| bytes)
     }
 
+    /// One digest over the lines of `SHA256SUMS` for the files that count.
+    pub(crate) fn digest_of(&self, counts: impl Fn(&str) -> bool) -> String {
+        let counted = self.digests.iter().filter(|(file, _)| counts(file));
+        let text: String = counted.map(|(file, digest)| format!("{digest}  {file}\n")).collect();
+        hex_digest(text.as_bytes())
+    }
+
+    /// The text of a result file, checked; none if there is no such file.
+    pub(crate) fn text_if_there(&self, relative: &str) -> Result<Option<String>, Error> {
+        if !self.path.join(relative).exists() {
+            return Ok(None);
+        }
+        self.read(relative).map(|bytes| Some(String::from_utf8_lossy(&bytes).into_owned()))
+    }
+
     /// Checks bytes against the digest that the folder has for them, if any.
     pub(crate) fn check(&self, relative: &str, bytes: &[u8]) -> Result<(), Error> {
         match self.digests.get(relative) {

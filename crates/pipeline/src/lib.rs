@@ -11,6 +11,7 @@
 //! | a config at many settings | [`sweep`](mod@sweep) |
 //! | the run folder: atomic files, digests, one lock | `folder` |
 //! | how a result came about, what each method cost | `provenance`, `methods` |
+//! | the page of a run: what it is made from | `page` |
 //! | what the columns of the tables mean | `dictionary` |
 //! | a point of the scan on the map, and back | [`mod@locate`] |
 //! | the calibre on the way to a place | [`profile()`] |
@@ -31,6 +32,7 @@ mod event;
 mod folder;
 pub mod locate;
 mod methods;
+mod page;
 mod phantom;
 mod profile;
 mod provenance;

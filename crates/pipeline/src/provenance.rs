@@ -49,7 +49,7 @@ pub(crate) const TIMING_COLUMNS: [Column; 4] = [
     ),
 ];
 
-const INPUTS_FILE: &str = "provenance/inputs.tsv";
+pub(crate) const INPUTS_FILE: &str = "provenance/inputs.tsv";
 const RUN_FILE: &str = "provenance/run.json";
 const TIMINGS_FILE: &str = "provenance/timings.tsv";
 /// The role of the input in `provenance/inputs.tsv`.

@@ -261,7 +261,7 @@ fn stages_to_do(request: &Request, source: &Source) -> Result<Vec<Stage>, Error>
         }
     }
     let from = request.from.unwrap_or(Stage::Phantom);
-    let to = request.to.unwrap_or(Stage::Render);
+    let to = request.to.unwrap_or(Stage::Report);
     if from > to {
         return Err(Error::EmptyRange { from, to });
     }

@@ -3,6 +3,7 @@
 //! Each stage brings its own table along when its results are written, so the file speaks of what is there, also
 //! after a run that began in the middle, ended early, or failed.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use toml::{Table, Value};
@@ -76,6 +77,49 @@ impl Settings {
         }
         // Plain tables: serialisation cannot fail. They are sorted by key, however they were put together.
         folder.write(FILE, toml::to_string(kept).unwrap_or_default().as_bytes())
+    }
+}
+
+/// Every setting of a run as a dotted key with its value, and the value that it has when nobody says; of files only that
+/// there is one.
+pub(crate) fn listed(config: &Config, stages: &[Stage]) -> Vec<(String, String, Option<String>)> {
+    let mut config = config.clone();
+    let hidden = |path: &mut Option<String>| {
+        *path = path.take().filter(|path| !path.is_empty()).map(|_| "(a file)".to_owned());
+    };
+    hidden(&mut config.input.path);
+    SideFile::ALL.into_iter().for_each(|side| hidden(side.slot(&mut config)));
+    let is_shown = |key: &str| {
+        let table = key.split('.').next().unwrap_or_default();
+        table == "input" || stages.iter().any(|stage| stage.name() == table)
+    };
+    let flat = |config: &Config| {
+        let mut keys = BTreeMap::new();
+        flatten("", &toml::from_str(&config.to_toml()).unwrap_or_default(), &mut keys);
+        keys
+    };
+    let mut defaults = flat(&Config::default());
+    let mut listed: Vec<_> = flat(&config)
+        .into_iter()
+        .map(|(key, value)| {
+            let default = defaults.remove(&key);
+            (key, value, default)
+        })
+        .collect();
+    listed.extend(defaults.into_iter().map(|(key, default)| (key, "not set".to_owned(), Some(default))));
+    listed.retain(|(key, ..)| is_shown(key));
+    listed
+}
+
+/// The values of a table and of those in it, by dotted key.
+fn flatten(prefix: &str, table: &Table, keys: &mut BTreeMap<String, String>) {
+    // The depth is that of our own structs.
+    for (key, value) in table {
+        let key = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
+        match value {
+            Value::Table(inner) => flatten(&key, inner, keys),
+            value => _ = keys.insert(key, value.to_string()),
+        }
     }
 }
 

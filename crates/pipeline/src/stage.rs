@@ -21,6 +21,8 @@ pub enum Stage {
     Embed,
     /// Embedding → pictures.
     Render,
+    /// Everything before → the page of the run.
+    Report,
 }
 
 /// A piece of hand-over data that has a file.
@@ -48,7 +50,7 @@ pub enum Artifact {
 
 impl Stage {
     /// All stages in order.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Phantom,
         Self::Volume,
         Self::Skeleton,
@@ -57,6 +59,7 @@ impl Stage {
         Self::Views,
         Self::Embed,
         Self::Render,
+        Self::Report,
     ];
 
     /// The name in configs, commands and folders.
@@ -71,6 +74,7 @@ impl Stage {
             Self::Views => "views",
             Self::Embed => "embed",
             Self::Render => "render",
+            Self::Report => "report",
         }
     }
 
@@ -98,7 +102,7 @@ impl Stage {
             Self::Tree => &[Artifact::Mask, Artifact::Skeleton, Artifact::Spheres],
             Self::Views => &[Artifact::Tree],
             Self::Embed => &[Artifact::Tree, Artifact::Views],
-            Self::Render => &[Artifact::Tree, Artifact::Views, Artifact::Embedding],
+            Self::Render | Self::Report => &[Artifact::Tree, Artifact::Views, Artifact::Embedding],
         }
     }
 
@@ -107,7 +111,15 @@ impl Stage {
     pub fn writes(self) -> Vec<String> {
         let files: &[&str] = match self {
             Self::Phantom => &["ct.nii.gz", "truth-mask.nii.gz", "truth.swc"],
-            Self::Volume => &["mask.nii.gz", "dropped.tsv"],
+            Self::Volume => &[
+                "mask.nii.gz",
+                "dropped.tsv",
+                "growth.tsv",
+                "seeds.tsv",
+                "slices-axial.png",
+                "slices-coronal.png",
+                "slices-sagittal.png",
+            ],
             Self::Skeleton => &["skeleton.nii.gz"],
             Self::Radius => &["radius.nii.gz", "distance.nii.gz", "spheres.tsv"],
             Self::Tree => &[
@@ -144,6 +156,7 @@ impl Stage {
                 "/convergence.png",
                 "/convergence.svg",
             ],
+            Self::Report => &["/report.html", "/provenance/methods.md", "/provenance/references.bib"],
         };
         let folder = self.folder();
         let mut paths: Vec<String> = files

@@ -19,6 +19,7 @@ use crate::error::Error;
 use crate::event::Event;
 use crate::folder::RunFolder;
 use crate::methods::MethodWatch;
+use crate::page;
 use crate::phantom;
 use crate::provenance::PartCost;
 use crate::run::boxed;
@@ -55,6 +56,7 @@ pub(crate) fn perform(step: &mut Step<'_>) -> Result<Outcome, Error> {
         Stage::Views => views(step),
         Stage::Embed => embed(step),
         Stage::Render => render(step),
+        Stage::Report => page::report(step),
     }
 }
 
@@ -102,7 +104,8 @@ fn volume(step: &mut Step<'_>) -> Result<Outcome, Error> {
     if let Some((stable, leaking)) = segmented.growth.as_ref().and_then(espalier_volume::Growth::leak) {
         line = format!("{line}; it leaks at {}, {} is the last before", leaking.threshold, stable.threshold);
     }
-    let report = segmented.report;
+    let mut report = segmented.report;
+    let slices = page::slices(step, &mask, &mut report)?;
     if let Some(left) = report.get("tunnels_left") {
         line = format!("{line}; {} tunnels, {left} left", report.get("tunnels").unwrap_or(left));
     }
@@ -116,6 +119,7 @@ fn volume(step: &mut Step<'_>) -> Result<Outcome, Error> {
     if !segmented.seeds.is_empty() {
         files.push(step.beside("seeds.tsv", espalier_volume::seeds_to_tsv(&segmented.seeds).into_bytes()));
     }
+    files.extend(slices);
     step.artifacts.mask = Some(Arc::new(mask));
     Ok(Outcome { files, report, line })
 }
@@ -299,7 +303,7 @@ fn render(step: &mut Step<'_>) -> Result<Outcome, Error> {
 
 impl<'a> Step<'a> {
     /// An artifact, from memory or from its file.
-    fn take<T>(
+    pub(crate) fn take<T>(
         &mut self,
         artifact: impl FnOnce(&mut Artifacts, Lookup<'a>) -> Result<T, Error>,
     ) -> Result<T, Error> {
@@ -307,12 +311,12 @@ impl<'a> Step<'a> {
         artifact(self.artifacts, lookup)
     }
 
-    fn failed(&self, error: impl espalier_model::Diagnose + Send + Sync + 'static) -> Error {
+    pub(crate) fn failed(&self, error: impl espalier_model::Diagnose + Send + Sync + 'static) -> Error {
         Error::stage(self.stage)(boxed(error))
     }
 
     /// Whether the tree comes from a traced one. A mask named by the user goes before the config's source.
-    fn is_traced(&self) -> bool {
+    pub(crate) fn is_traced(&self) -> bool {
         let named = |artifact| self.artifacts.files.contains_key(&artifact);
         named(Artifact::Traced)
             || (matches!(self.source, Source::PhantomTree(_) | Source::Tree(_)) && !named(Artifact::Mask))
@@ -324,7 +328,7 @@ impl<'a> Step<'a> {
     }
 
     /// The bytes of another file in the stage's own folder.
-    fn beside(&self, name: &str, bytes: Vec<u8>) -> (String, Vec<u8>) {
+    pub(crate) fn beside(&self, name: &str, bytes: Vec<u8>) -> (String, Vec<u8>) {
         (format!("{}/{name}", self.stage.folder()), bytes)
     }
 

@@ -4,7 +4,7 @@
 //! |--:|---|---|
 //! | 0 | `map` | what each point of the plane stands for in the patient |
 //! | 1 | `scene` | nodes in picture space: the map, or the global view |
-//! | 2 | `coloring`, `palette`, `unit` | a value for each end of each edge, its colour, its scale |
+//! | 2 | `coloring`, `palette`, `unit`, `color_table` | a value for each end of each edge, its colour, its scale |
 //! | 3 | `heading`, `furniture`, `text` | what stands beside the tree, and how much room it needs |
 //! | 4 | `page` | scale and places |
 //! | 5 | `sketch`, `cone`, `kinship` | edges as round cones in pixels |
@@ -20,6 +20,7 @@ mod map;
 
 mod scene;
 
+mod color_table;
 mod coloring;
 mod palette;
 mod unit;
@@ -56,6 +57,7 @@ use espalier_model::{Branches, Embedding, Report, Tree, ViewHierarchy};
 use glam::DVec3;
 
 pub use chart::{Chart, Charts, charts};
+pub use color_table::{ColorTable, color_table};
 use coloring::Coloring;
 pub use convergence::{Searched, convergence};
 pub use error::Error;

@@ -48,6 +48,8 @@ pub struct Config {
     pub embed: espalier_embed::Params,
     /// `[render]`: pictures.
     pub render: espalier_render::Params,
+    /// `[report]`: the page of the run.
+    pub report: espalier_report::Params,
 }
 
 impl Default for Config {
@@ -65,6 +67,7 @@ impl Default for Config {
             views: espalier_views::Params::default(),
             embed: espalier_embed::Params::default(),
             render: espalier_render::Params::default(),
+            report: espalier_report::Params::default(),
         }
     }
 }
@@ -162,17 +165,28 @@ impl Config {
     /// As [`Config::parse`].
     pub fn for_input(input: &Path, overrides: &[Override]) -> Result<Self, Box<ConfigError>> {
         let path = input.to_string_lossy();
-        let file_name = input.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        let stem = file_name.split('.').next().unwrap_or_default();
-        let name: String =
-            stem.chars().map(|c| if is_name_character(c) { c } else { '_' }).take(100).collect();
-        let name = if name.is_empty() { "run" } else { name.as_str() };
+        let name = Self::name_of_input(input);
         let text = format!(
             "schema = {SCHEMA}\nname = {}\n[input]\npath = {}\n",
             toml::Value::from(name),
             toml::Value::from(path.as_ref())
         );
         Self::parse(&text, Path::new("command line"), overrides)
+    }
+
+    /// The name of a run that is given only its input.
+    fn name_of_input(input: &Path) -> String {
+        let file_name = input.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let stem = file_name.split('.').next().unwrap_or_default();
+        let name: String =
+            stem.chars().map(|c| if is_name_character(c) { c } else { '_' }).take(100).collect();
+        if name.is_empty() { "run".to_owned() } else { name }
+    }
+
+    /// The name of the run, unless it is only that of the input's file, which may be a patient's.
+    pub(crate) fn own_name(&self) -> Option<&str> {
+        let of_input = self.input.path.as_ref().map(|path| Self::name_of_input(Path::new(path)));
+        (of_input.as_ref() != Some(&self.name)).then_some(self.name.as_str())
     }
 
     /// The config with every key, as TOML.
@@ -204,7 +218,8 @@ impl Config {
         self.tree.validate().map_err(at(Some(Stage::Tree)))?;
         self.views.validate().map_err(at(Some(Stage::Views)))?;
         self.embed.validate().map_err(at(Some(Stage::Embed)))?;
-        self.render.validate().map_err(at(Some(Stage::Render)))
+        self.render.validate().map_err(at(Some(Stage::Render)))?;
+        self.report.validate().map_err(at(Some(Stage::Report)))
     }
 }
 

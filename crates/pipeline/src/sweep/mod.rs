@@ -152,7 +152,7 @@ fn first_changed(axes: &[Axis]) -> Result<Stage, Error> {
         let table = key.split('.').next().unwrap_or_default();
         // Input and seed concern all stages; a table that there is not is an unknown key, which the config refuses.
         let stage = Stage::from_name(table).unwrap_or(Stage::Phantom);
-        if stage == Stage::Render || matches!(table, "name" | "schema") {
+        if stage >= Stage::Render || matches!(table, "name" | "schema") {
             return refuse(NotSwept::Ineffective);
         }
         first = first.min(stage);
