@@ -27,6 +27,9 @@ struct Arguments {
     /// Threads to use.
     #[arg(long, default_value_t = 1)]
     threads: usize,
+    /// Where to write the skeleton, or the distances, as `.nii.gz`, to be compared with a peer's.
+    #[arg(long)]
+    out: Option<PathBuf>,
     /// A mask.
     file: PathBuf,
 }
@@ -41,8 +44,10 @@ enum Phase {
     ThinningLee94,
     /// Thinning by default.
     ThinningSafe,
-    /// Inscribed spheres at the skeleton.
-    Radii,
+    /// Exact distances to the background at the skeleton, and nothing else: what `edt` gives there.
+    RadiiDistances,
+    /// Inscribed spheres at the skeleton: distances, sub-voxel centres, cross-sections.
+    RadiiSpheres,
     /// Skeleton and spheres to one rooted tree.
     Tree,
     /// The file to the tree.
@@ -67,10 +72,10 @@ fn main() -> ExitCode {
 
 fn measure(arguments: &Arguments) -> Outcome<(f64, String)> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads).build()?;
-    pool.install(|| time_phase(arguments.phase, &arguments.file))
+    pool.install(|| time_phase(arguments.phase, &arguments.file, arguments.out.as_deref()))
 }
 
-fn time_phase(phase: Phase, file: &Path) -> Outcome<(f64, String)> {
+fn time_phase(phase: Phase, file: &Path, out: Option<&Path>) -> Outcome<(f64, String)> {
     let voxels = |n: usize| format!("{n} voxels");
     match phase {
         Phase::Load => best_of(|| Ok(voxels(load(file)?.n_foreground()))),
@@ -83,9 +88,22 @@ fn time_phase(phase: Phase, file: &Path) -> Outcome<(f64, String)> {
             let mask = load(file)?;
             let is_safe = matches!(phase, Phase::ThinningSafe);
             let thinning = if is_safe { Thinning::Safe } else { Thinning::Lee94 };
+            if let Some(out) = out {
+                std::fs::write(out, espalier_model::nifti_out::skeleton(&thin(&mask, thinning)?)?)?;
+            }
             best_of(|| Ok(voxels(thin(&mask, thinning)?.voxels().len())))
         }
-        Phase::Radii => {
+        Phase::RadiiDistances => {
+            let mask = load(file)?;
+            let skeleton = thin(&mask, Thinning::Safe)?;
+            if let Some(out) = out {
+                let values: Vec<f32> =
+                    espalier_radius::distances_mm(&mask, &skeleton)?.iter().map(|&mm| mm as f32).collect();
+                std::fs::write(out, espalier_model::nifti_out::skeleton_scalars(&skeleton, &values)?)?;
+            }
+            best_of(|| Ok(format!("{} distances", espalier_radius::distances_mm(&mask, &skeleton)?.len())))
+        }
+        Phase::RadiiSpheres => {
             let mask = load(file)?;
             let skeleton = thin(&mask, Thinning::Safe)?;
             best_of(|| Ok(format!("{} spheres", measure_radii(&mask, &skeleton)?.0.len())))
@@ -122,10 +140,11 @@ fn whole(file: &Path) -> Outcome<String> {
     grow(&mask, &skeleton, &spheres)
 }
 
-/// The file as a mask, nothing dropped.
+/// The file as a mask, nothing dropped, in the file's own order, which the peers see.
 fn load(file: &Path) -> Outcome<Mask> {
     let params = espalier_volume::Params {
         components: espalier_volume::Components::All,
+        orientation: espalier_volume::Orientation::Stored,
         fill_cavities: false,
         close_tunnels: false,
         ..espalier_volume::Params::default()

@@ -49,10 +49,7 @@ pub struct Measured {
 /// [`Error::GridMismatch`] if the two have different grids, [`Error::EmptySkeleton`], and [`Error::OutsideMask`]
 /// at the first skeleton voxel that is background.
 pub fn inscribed_spheres(mask: &Mask, skeleton: &Skeleton, params: &Params) -> Result<Measured, Error> {
-    check(mask, skeleton)?;
-    let background = Background::of(mask);
-    let distance_mm = |voxel: &[u32; 3]| background.distance_mm(voxel.map(i64::from));
-    let distances_mm: Vec<f64> = skeleton.voxels().par_iter().map(distance_mm).collect();
+    let distances_mm = distances_mm(mask, skeleton)?;
     let tangents = tangent::tangents(skeleton, &distances_mm);
     let spheres: Vec<Sphere> = (0..skeleton.voxels().len())
         .into_par_iter()
@@ -60,6 +57,18 @@ pub fn inscribed_spheres(mask: &Mask, skeleton: &Skeleton, params: &Params) -> R
         .collect();
     let report = report(skeleton, &spheres);
     Ok(Measured { spheres: InscribedSpheres(spheres), report })
+}
+
+/// The exact distance from each voxel of `skeleton` to the nearest background centre of `mask`, in mm; infinite in a
+/// mask without background.
+///
+/// # Errors
+/// As [`inscribed_spheres`].
+pub fn distances_mm(mask: &Mask, skeleton: &Skeleton) -> Result<Vec<f64>, Error> {
+    check(mask, skeleton)?;
+    let background = Background::of(mask);
+    let distance_mm = |voxel: &[u32; 3]| background.distance_mm(voxel.map(i64::from));
+    Ok(skeleton.voxels().par_iter().map(distance_mm).collect())
 }
 
 fn check(mask: &Mask, skeleton: &Skeleton) -> Result<(), Error> {
