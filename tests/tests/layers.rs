@@ -18,6 +18,7 @@ const LAYERS: &[(&str, u32)] = &[
     ("espalier-embed", 2),
     ("espalier-render", 2),
     ("espalier-phantom", 2),
+    ("espalier-juxtapose", 2),
     ("espalier-verify", 2),
     ("espalier-report", 2),
     ("espalier-pipeline", 3),

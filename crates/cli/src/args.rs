@@ -115,6 +115,8 @@ pub(crate) enum Command {
     Run(RunArguments),
     /// Methods or runs side by side: one table, one figure
     Compare(CompareArguments),
+    /// A baseline and a follow-up on one shared map: lost and new branches, changes of radius
+    Juxtapose(JuxtaposeArguments),
     /// A config at many settings: a table and a plot of the losses
     Sweep(SweepArguments),
     /// Make a phantom with its truth: CT, mask and tree
@@ -158,6 +160,43 @@ pub(crate) struct RunArguments {
     /// End after this stage
     #[arg(long, value_name = "STAGE", value_parser = parse_stage)]
     pub(crate) to: Option<Stage>,
+}
+
+const JUXTAPOSE_HELP: &str = "\
+The follow-up is moved onto the baseline by the forks that match (no images are registered), branches are matched from
+the root on, and the tree of both is laid flat once, with the baseline's settings: what both have lies in the same place
+of both panels, at the baseline's lengths.
+
+Writes into the folder: juxtaposition.png and juxtaposition.svg (both trees at one scale, differences coloured),
+juxtaposition.tsv (a row per branch: matched, lost or new; lengths, radii, their change, the narrowest place, angles),
+juxtaposition.json (how the follow-up was moved, what that leaves in mm), shared.swc, shared-nodes.tsv and
+shared-embedding.json (the tree of both), dictionary.tsv (what each column means).
+
+Examples:
+  espalier juxtapose out/2023 out/2024 -o out/change         two runs
+  espalier juxtapose before.nii.gz after.nii.gz              runs both up to the tree first
+  espalier juxtapose out/a out/b --align similarity          an animal that grew
+  espalier juxtapose out/a out/b --change length             colours by change of length";
+
+/// `espalier juxtapose`.
+#[derive(Debug, Args)]
+#[command(after_help = JUXTAPOSE_HELP)]
+pub(crate) struct JuxtaposeArguments {
+    /// The baseline: a run folder; or a config (.toml) or an input, which is run first, to a folder of its name in DIR
+    #[arg(value_name = "BASELINE")]
+    pub(crate) baseline: PathBuf,
+    /// The follow-up, likewise
+    #[arg(value_name = "FOLLOWUP")]
+    pub(crate) followup: PathBuf,
+    /// Where the results go
+    #[arg(short, long, value_name = "DIR", default_value = "out/juxtapose")]
+    pub(crate) out: PathBuf,
+    /// How the follow-up is brought to the baseline: turned and moved; scaled too; or as it is, in the same space
+    #[arg(long, value_name = "HOW", default_value = "rigid", value_parser = ["rigid", "similarity", "as-is"])]
+    pub(crate) align: String,
+    /// What the colours mean
+    #[arg(long, value_name = "WHAT", default_value = "radius", value_parser = ["radius", "length"])]
+    pub(crate) change: String,
 }
 
 const COMPARE_HELP: &str = "\

@@ -10,13 +10,13 @@ use anyhow::anyhow;
 use espalier_model::Diagnose;
 use espalier_model::diagnose::Class;
 use espalier_pipeline::{
-    Artifact, CompareRequest, Config, Error, Loaded, Override, Request, SideFile, Space, Stage, Subject,
-    Summary, SweepRequest, WayTo,
+    Align, Artifact, ChangeOf, CompareRequest, Config, Error, JuxtaposeParams, JuxtaposeRequest, Loaded,
+    Override, Request, SideFile, Space, Stage, Subject, Summary, SweepRequest, WayTo,
 };
 
 use crate::args::{
-    Arguments, Command, CompareArguments, LocateArguments, PhantomArguments, PlaceArguments,
-    ProfileArguments, RunArguments, StageArguments, SweepArguments, VerifyArguments,
+    Arguments, Command, CompareArguments, JuxtaposeArguments, LocateArguments, PhantomArguments,
+    PlaceArguments, ProfileArguments, RunArguments, StageArguments, SweepArguments, VerifyArguments,
 };
 use crate::checks;
 use crate::progress::{self, Progress};
@@ -29,6 +29,7 @@ pub(crate) fn execute(arguments: &Arguments) -> anyhow::Result<()> {
     let summary = match &arguments.command {
         Command::Run(run) => run_pipeline(arguments, run)?,
         Command::Compare(compare) => run_compare(arguments, compare)?,
+        Command::Juxtapose(juxtapose) => run_juxtapose(arguments, juxtapose)?,
         Command::Sweep(sweep) => run_sweep(arguments, sweep)?,
         Command::Phantom(phantom) => make_phantom(arguments, phantom)?,
         Command::Volume(stage) => run_stage(arguments, stage, Stage::Volume)?,
@@ -144,17 +145,9 @@ fn run_pipeline(arguments: &Arguments, run: &RunArguments) -> anyhow::Result<Sum
 
 fn run_compare(arguments: &Arguments, compare: &CompareArguments) -> anyhow::Result<Summary> {
     let overrides = &arguments.common.overrides;
-    let subject = |path: &PathBuf| {
-        // A folder that is no run but has DICOM slices in it is an input.
-        let is_input = !is_run(path) && espalier_pipeline::is_dicom_folder(path);
-        if path.is_dir() && !is_input {
-            Ok(Subject::Run(path.clone()))
-        } else {
-            load(path, overrides).map(|loaded| Subject::Config(Box::new(loaded)))
-        }
-    };
+    let subjects = compare.subjects.iter().map(|path| subject(path, overrides));
     let request = CompareRequest {
-        subjects: compare.subjects.iter().map(subject).collect::<anyhow::Result<_>>()?,
+        subjects: subjects.collect::<anyhow::Result<_>>()?,
         out: compare.out.clone(),
         overrides: overrides.clone(),
         threads: arguments.common.threads.map(usize::from),
@@ -163,6 +156,35 @@ fn run_compare(arguments: &Arguments, compare: &CompareArguments) -> anyhow::Res
     };
     let progress = Progress::new(arguments.common.quiet);
     let compared = espalier_pipeline::compare(&request, &|event| progress.show(event))?;
+    progress::result(&compared.table);
+    Ok(compared.summary)
+}
+
+/// A run folder, or an input or config to be run.
+fn subject(path: &Path, overrides: &[Override]) -> anyhow::Result<Subject> {
+    // A folder that is no run but has DICOM slices in it is an input.
+    let is_input = !is_run(path) && espalier_pipeline::is_dicom_folder(path);
+    if path.is_dir() && !is_input {
+        return Ok(Subject::Run(path.to_owned()));
+    }
+    load(path, overrides).map(|loaded| Subject::Config(Box::new(loaded)))
+}
+
+fn run_juxtapose(arguments: &Arguments, juxtapose: &JuxtaposeArguments) -> anyhow::Result<Summary> {
+    let overrides = &arguments.common.overrides;
+    let align = Align::ALL.into_iter().find(|align| align.name() == juxtapose.align).unwrap_or_default();
+    let request = JuxtaposeRequest {
+        subjects: [subject(&juxtapose.baseline, overrides)?, subject(&juxtapose.followup, overrides)?],
+        out: juxtapose.out.clone(),
+        overrides: overrides.clone(),
+        params: JuxtaposeParams { align, ..JuxtaposeParams::default() },
+        change: if juxtapose.change == "length" { ChangeOf::Length } else { ChangeOf::Radius },
+        threads: arguments.common.threads.map(usize::from),
+        max_memory_bytes: arguments.common.max_memory.unwrap_or_else(half_of_memory),
+        data_dir: data_dir(),
+    };
+    let progress = Progress::new(arguments.common.quiet);
+    let compared = espalier_pipeline::juxtapose(&request, &|event| progress.show(event))?;
     progress::result(&compared.table);
     Ok(compared.summary)
 }

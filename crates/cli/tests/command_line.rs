@@ -59,8 +59,21 @@ fn help_teaches_and_succeeds() {
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert_eq!(output.status.code(), Some(0));
     for command in [
-        "run", "compare", "sweep", "phantom", "volume", "skeleton", "radius", "tree", "views", "embed",
-        "render", "verify", "profile", "locate",
+        "run",
+        "compare",
+        "juxtapose",
+        "sweep",
+        "phantom",
+        "volume",
+        "skeleton",
+        "radius",
+        "tree",
+        "views",
+        "embed",
+        "render",
+        "verify",
+        "profile",
+        "locate",
     ] {
         assert!(text.contains(&format!("\n  {command} ")), "no {command} in: {text}");
     }
@@ -529,4 +542,65 @@ fn a_sweep_in_vain_is_refused() {
     refuse(&["embed.w_length=1,2", "embed.w_length=3"], &["is given twice"]);
     let many = format!("seed={}", (0..200).map(|i| i.to_string()).collect::<Vec<_>>().join(","));
     refuse(&[&many, &many.replace("seed", "views.seed_of_nothing")], &["40000 combinations", "10000"]);
+}
+
+/// A fork whose left arm is `left` wide, without or with a third arm.
+fn fork(left: f64, has_third: bool) -> String {
+    let third = if has_third { "5 3 0 0 -30 1 2\n" } else { "" };
+    format!("1 3 0 0 40 4 -1\n2 3 0 0 0 4 1\n3 3 -20 5 -25 {left} 2\n4 3 24 2 -18 3 2\n{third}")
+}
+
+#[test]
+fn a_follow_up_is_held_against_its_baseline() {
+    let folder = folder_with("before.swc", fork(3.0, false).as_bytes());
+    std::fs::write(folder.path().join("after.swc"), fork(1.5, true)).expect("written");
+    let quick = ["--set", "embed.pso.iterations=2", "-q"];
+    let arguments = |more: &[&'static str]| [more, &quick].concat();
+    let output = espalier(folder.path(), &arguments(&["juxtapose", "before.swc", "after.swc", "-o", "j"]));
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let read = |file: &str| std::fs::read_to_string(folder.path().join(file)).expect(file);
+    let rows: Vec<Vec<String>> = read("j/juxtaposition.tsv")
+        .lines()
+        .map(|line| line.split('\t').map(str::to_owned).collect())
+        .collect();
+    let cell = |row: usize, name: &str| {
+        let column = rows[0].iter().position(|column| column == name).expect(name);
+        rows[row][column].as_str()
+    };
+    let fates: Vec<&str> = (1..rows.len()).map(|row| cell(row, "fate")).collect();
+    assert_eq!(fates, ["matched", "matched", "matched", "new"]);
+    assert_eq!(cell(2, "radius_change_percent"), "-50.00");
+    assert_eq!(cell(3, "radius_change_percent"), "0.00");
+    let dictionary = read("j/dictionary.tsv");
+    for (table, file) in
+        [("juxtaposition.tsv", "j/juxtaposition.tsv"), ("shared-nodes.tsv", "j/shared-nodes.tsv")]
+    {
+        for column in read(file).lines().next().expect("a header").split('\t') {
+            assert!(dictionary.contains(&format!("{table}\t{column}\t")), "{column} is not explained");
+        }
+    }
+    let sums = read("j/SHA256SUMS");
+    for file in [
+        "juxtaposition.png",
+        "juxtaposition.svg",
+        "juxtaposition.json",
+        "shared.swc",
+        "shared-embedding.json",
+    ] {
+        assert!(sums.contains(file), "{file} in {sums}");
+    }
+    // The runs that it made serve again, on one thread and to the same bytes.
+    let again = ["juxtapose", "j/before", "j/after", "-o", "again", "--threads", "1"];
+    let output = espalier(folder.path(), &arguments(&again));
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert_eq!(read("again/SHA256SUMS"), sums);
+
+    let refused =
+        espalier(folder.path(), &["juxtapose", "j/before", "j/after", "--set", "tree.prune_factor=3"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(stderr(&refused).contains("E-JUXTAPOSE-SETTINGS"), "{}", stderr(&refused));
+    std::fs::create_dir(folder.path().join("empty")).expect("made");
+    let refused = espalier(folder.path(), &["juxtapose", "empty", "j/after"]);
+    assert_eq!(refused.status.code(), Some(74));
+    assert!(stderr(&refused).contains("E-JUXTAPOSE-NO-TREE"), "{}", stderr(&refused));
 }

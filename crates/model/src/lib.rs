@@ -30,6 +30,7 @@ mod edits;
 mod embedding;
 pub mod graphml_out;
 mod grid;
+mod juxtaposition;
 pub mod label_table;
 mod ledger;
 mod mask;
@@ -58,6 +59,10 @@ pub use embedding::{
     TargetKind, Targets, Termination, TracePoint, WidthMode, Widths, compare_columns,
 };
 pub use grid::{Grid, GridError, RAS_FROM_LPS};
+pub use juxtaposition::{
+    Alignment, BranchChange, CHANGE_COLUMNS, Fate, Juxtaposition, SHARED_NODE_COLUMNS, SharedNode,
+    change_percent,
+};
 pub use ledger::{LEDGER_COLUMNS, Ledger, LedgerEntry, LedgerKind};
 pub use mask::Mask;
 pub use report::{Count, Report, Warning};

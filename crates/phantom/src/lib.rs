@@ -39,6 +39,7 @@ mod tissue;
 mod topology;
 mod truth;
 mod tubes;
+mod twin;
 mod vessel;
 
 use std::sync::Arc;
@@ -50,6 +51,7 @@ pub use body::Body;
 pub use error::Error;
 pub use params::{Kind, MAX_NODES, MAX_VOXELS, Params};
 pub use truth::{Segmentation, Truth};
+pub use twin::{Disease, Growth, twin};
 
 use shape::Shape;
 

@@ -87,6 +87,22 @@ pub enum Error {
         /// The run folder.
         folder: PathBuf,
     },
+    /// A setting that a finished run's tree depends on.
+    #[error("--set {key}: the tree of {folder} was made with other settings already", folder = folder.display())]
+    SettledTree {
+        /// The key.
+        key: String,
+        /// The run folder.
+        folder: PathBuf,
+    },
+    /// A folder without a tree to compare.
+    #[error("{folder} holds no tree of a run: {missing} is missing", folder = folder.display())]
+    NoTree {
+        /// The folder.
+        folder: PathBuf,
+        /// The file that is not there.
+        missing: &'static str,
+    },
     /// An embedding whose certificate does not hold.
     #[error("{path} states {stated} crossings, its coordinates have {found}", path = path.display())]
     Certificate {
@@ -271,6 +287,8 @@ impl Diagnose for Error {
             Self::NoRun { .. } => "E-COMPARE-NO-RUN",
             Self::RunInTheWay { .. } => "E-COMPARE-FOLDER",
             Self::Settled { .. } => "E-COMPARE-SETTINGS",
+            Self::SettledTree { .. } => "E-JUXTAPOSE-SETTINGS",
+            Self::NoTree { .. } => "E-JUXTAPOSE-NO-TREE",
             Self::NotSwept { .. } | Self::SweepSize { .. } => "E-SWEEP",
             Self::Altered { .. } => "E-RUN-ALTERED-FILE",
             Self::Certificate { .. } => "E-RUN-CERTIFICATE",
@@ -302,12 +320,15 @@ impl Diagnose for Error {
             | Self::OtherInput { .. }
             | Self::RunInTheWay { .. }
             | Self::Settled { .. }
+            | Self::SettledTree { .. }
             | Self::NotSwept { .. }
             | Self::SweepSize { .. }
             | Self::Threads { .. } => Class::Usage,
-            Self::NoRun { .. } | Self::MissingArtifact { .. } | Self::Read { .. } | Self::Write { .. } => {
-                Class::Io
-            }
+            Self::NoRun { .. }
+            | Self::NoTree { .. }
+            | Self::MissingArtifact { .. }
+            | Self::Read { .. }
+            | Self::Write { .. } => Class::Io,
             Self::Altered { .. } | Self::Certificate { .. } | Self::Unverified { .. } => Class::Uncertified,
             Self::TooLarge { .. } => Class::Limit,
             Self::Create { .. } => Class::CannotCreate,
@@ -325,6 +346,10 @@ impl Diagnose for Error {
             Self::Point { cause, .. } => cause.hint(),
             Self::NoSuchSpace { .. } => "give points in RAS+ mm, with --lps in LPS+ mm, or on the map in mm".to_owned(),
             Self::NoRun { .. } => "run it with this version, at least up to --to embed".to_owned(),
+            Self::NoTree { .. } => "run it with this version, at least up to --to tree".to_owned(),
+            Self::SettledTree { .. } => {
+                "of finished runs seed, views.*, embed.* and render.* can be changed; or give the configs".to_owned()
+            }
             Self::RunInTheWay { .. } => "choose another folder with -o".to_owned(),
             Self::NotSwept { .. } => "write --over KEY=V1,V2,…, such as --over embed.w_length=0.5,1,2,4".to_owned(),
             Self::SweepSize { .. } => "give fewer values, or sweep one key at a time".to_owned(),

@@ -8,6 +8,7 @@
 //! | what each stage does with them | `steps`, `tree_outputs` |
 //! | the loop over the stages | [`run`](mod@run) |
 //! | methods and runs side by side | [`compare`](mod@compare) |
+//! | two runs on one shared map | [`juxtapose`](mod@juxtapose) |
 //! | a config at many settings | [`sweep`](mod@sweep) |
 //! | the run folder: atomic files, digests, one lock | `folder` |
 //! | how a result came about, what each method cost | `provenance`, `methods` |
@@ -30,6 +31,7 @@ mod dictionary;
 mod error;
 mod event;
 mod folder;
+pub mod juxtapose;
 pub mod locate;
 mod methods;
 mod page;
@@ -48,9 +50,12 @@ mod verify;
 pub use compare::{CompareRequest, Compared, Subject, compare};
 pub use config::{Config, ConfigError, Loaded, Override};
 pub use error::{Error, NotSwept};
+pub use espalier_juxtapose::{Align, Params as JuxtaposeParams};
+pub use espalier_render::ChangeOf;
 pub use espalier_verify::{Check, Outcome};
 pub use espalier_volume::is_dicom_folder;
 pub use event::Event;
+pub use juxtapose::{JuxtaposeRequest, JuxtaposedRuns, juxtapose};
 pub use locate::{Given, Located, Space, locate, read_point, read_points};
 pub use phantom::make_phantom;
 pub use profile::{WayTo, profile};

@@ -10,7 +10,7 @@
 //! | 5 | `sketch`, `cone`, `kinship` | edges as round cones in pixels |
 //! | 6 | `raster`, `samples`, `shade` | the pixels |
 //! | 7 | `paint`, `svg`, `outline`, `layers` | the files |
-//! | 8 | `side_by_side`, `tiling`, `parts`; `chart`, `convergence` | several layouts in one figure; charts of numbers |
+//! | 8 | `side_by_side`, `tiling`, `parts`; `juxtaposed`; `chart`, `convergence` | several layouts in one figure; two trees on one map; charts of numbers |
 //!
 //! **Source** section 4.1 of [Hu2022].
 
@@ -47,6 +47,7 @@ mod svg;
 
 mod chart;
 mod convergence;
+mod juxtaposed;
 mod parts;
 mod side_by_side;
 mod tiling;
@@ -62,6 +63,7 @@ use coloring::Coloring;
 pub use convergence::{Searched, convergence};
 pub use error::Error;
 use furniture::Heading;
+pub use juxtaposed::{ChangeOf, juxtaposed};
 use kinship::Kinship;
 pub use map::{Beside, Place, PlanarMap, reach};
 use page::{Needs, Page, Pen};

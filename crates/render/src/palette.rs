@@ -32,6 +32,13 @@ const LOSSES_ON_DARK: [u32; 5] = [0x5a_646e, 0xb1_0026, 0xe3_1a1c, 0xfd_8d3c, 0x
 /// The colours of Okabe and Ito without black and yellow, lightened a little by the shading: for names.
 const NAMES: [u32; 6] = [0xe6_9f00, 0x56_b4e9, 0x00_9e73, 0x00_72b2, 0xd5_5e00, 0xcc_79a7];
 
+/// What became narrower or shorter is blue, what became wider or longer orange, no change a light grey. Safe for the
+/// colour-blind; ours.
+const CHANGES: [u32; 5] = [0x1b_5fa8, 0x7f_afd8, 0xcc_ccc8, 0xf2_a65a, 0xc2_4a05];
+
+/// Lost, new, and neither: unlike each other and both ends of [`CHANGES`] in hue and lightness, on light and dark pages.
+const FATES: [u32; 3] = [0xb8_0f78, 0x12_9b56, 0xa4_a8ad];
+
 /// A table of colours, read by a value in [0, 1].
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Palette {
@@ -58,6 +65,27 @@ impl Palette {
     /// Grey, then ever further from the colour of the page.
     pub(crate) fn losses(theme: Theme) -> Self {
         Self::continuous(if theme == Theme::Dark { &LOSSES_ON_DARK } else { &LOSSES })
+    }
+
+    /// Less, no change, more.
+    pub(crate) fn changes() -> Self {
+        Self::continuous(&CHANGES)
+    }
+
+    /// The colours of what is lost, new, and neither.
+    pub(crate) fn fates() -> [Rgb; 3] {
+        FATES.map(rgb)
+    }
+
+    /// The same table with further colours behind it; also what to multiply values by, and the value of each of them.
+    pub(crate) fn with(&self, further: [Rgb; 3]) -> (Self, f32, [f32; 3]) {
+        // Each stands three times, so that no rounding reads its neighbour.
+        let table: Vec<Rgb> =
+            self.table.iter().copied().chain(further.into_iter().flat_map(|color| [color; 3])).collect();
+        let last = (table.len() - 1) as f32;
+        let n_own = self.len();
+        let value = |i: usize| (n_own + 3 * i + 1) as f32 / last;
+        (Self { table, is_continuous: true }, (n_own - 1) as f32 / last, [value(0), value(1), value(2)])
     }
 
     /// Unordered colours for names.

@@ -102,7 +102,7 @@ pub fn compare(request: &CompareRequest, events: &(dyn Fn(Event) + Sync)) -> Res
 }
 
 /// A name for each subject, no two alike.
-fn names(subjects: &[Subject]) -> Vec<String> {
+pub(crate) fn names(subjects: &[Subject]) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for subject in subjects {
         let name = match subject {

@@ -1,0 +1,576 @@
+//! Two trees on one shared map, side by side at one scale and pose, differences coloured.
+//!
+//! **Input** the shared tree with what is known of its nodes, its places in the plane. **Output** PNG and SVG.
+//! **Steps** 1. The map is drawn twice, beside itself or below, whichever is larger: once with the radii of the baseline,
+//! once with those of the follow-up. 2. The baseline is grey; what it has alone has the colour of loss. In the follow-up
+//! what both have is coloured by its change, on a diverging scale whose middle is no change; what is new has a colour of
+//! its own. 3. What a tree has not is a thin line in its panel. 4. Key and scale bar stand at the right.
+//! **Guarantees** the same place of both panels is the same place of the shared map.
+//! **Source** section 4.1 and figure 8 of [Hu2022]; the colours are ours.
+//! **Cost** that of two small pictures.
+
+use std::fmt::Write as _;
+
+use espalier_model::{Embedding, Fate, Juxtaposition, SharedNode, change_percent};
+use glam::DVec2;
+
+use crate::coloring::{Coloring, Scale, Tick};
+use crate::cone::{Ball, Cone, Joint};
+use crate::drawing::{Group, Mark};
+use crate::furniture::{self, Heading};
+use crate::kinship::Kinship;
+use crate::outline::outline;
+use crate::page::{MAX_PIXELS, Page, Pen};
+use crate::palette::{PageColors, Palette, Rgb, hex};
+use crate::params::{Params, Style};
+use crate::raster::{self, Drawn, Job, Pixel};
+use crate::scene::Scene;
+use crate::side_by_side::SideBySide;
+use crate::text::{Anchor, Face};
+use crate::{Error, MAX_LAYERS, heading, paint, svg, unit};
+
+/// In layout units: font sizes of panel names and of the key, space between panels, around a tree, for the key.
+const TITLE: f64 = 1.6;
+const SMALL: f64 = 1.2;
+const GAP: f64 = 3.0;
+const RIM: f64 = 2.2;
+const KEY: f64 = 15.0;
+/// Line height over font size.
+const LEADING: f64 = 1.5;
+/// Height of all panels over the width of the page, at most.
+const MOST_HEIGHT: f64 = 0.85;
+/// By what factor panels below each other must be larger than beside each other: a page higher than wide is scrolled.
+const LEAST_GAIN_BELOW: f64 = 1.5;
+/// Width of what a tree has not, as a share of the least width of a branch.
+const GHOST: f64 = 0.75;
+/// Ends of the scale, in percent; the first that holds what is to be seen.
+const ENDS_PERCENT: [f64; 5] = [10.0, 20.0, 30.0, 40.0, 60.0];
+/// The share of the length whose changes the scale must tell apart.
+const SHARE_IN_SCALE: f64 = 0.98;
+
+/// What the colours of the follow-up mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ChangeOf {
+    /// The radius at each place.
+    #[default]
+    Radius,
+    /// The length of each branch.
+    Length,
+}
+
+/// Draws two trees on their shared map; `embedding` is that of the shared tree, `names` are those of the panels.
+///
+/// # Errors
+/// [`Error`] if a parameter is out of range, the embedding is another tree's, a number cannot be drawn, or the figure
+/// would be over 2²⁵ pixels.
+pub fn juxtaposed(
+    (found, embedding): (&Juxtaposition, &Embedding),
+    change: ChangeOf,
+    names: [&str; 2],
+    params: &Params,
+) -> Result<SideBySide, Error> {
+    params.validate()?;
+    let (n_entries, n_nodes) = (embedding.positions_mm.len(), found.shared.n_nodes());
+    if n_entries != n_nodes {
+        return Err(Error::Mismatch { what: "positions", n_entries, n_nodes });
+    }
+    let scene = Scene::flat(&found.shared, &embedding.positions_mm, params.width_scale)?;
+    let colors = PageColors::of(params.theme);
+    let coloring = Colors::new(found, change);
+    let artist = Artist { found, params, scene, coloring, colors, face: Face::built_in()? };
+    let sheet = artist.lay_out(&heading_of(found, embedding, params), names)?;
+    let (width, height) = (params.width_px, sheet.height);
+    let mut pixels = vec![Pixel::EMPTY; width as usize * height as usize];
+    for panel in &sheet.panels {
+        artist.draw(panel, sheet.style, &mut pixels);
+    }
+    let page = Page { width, height, ..sheet.panels[0].page };
+    let png = paint::png(&page, &pixels, &sheet.groups, (colors.background, &artist.face))?;
+    let title = params.title.as_deref().unwrap_or("juxtaposition");
+    Ok(SideBySide { png, svg: artist.svg(&sheet, title) })
+}
+
+fn heading_of(found: &Juxtaposition, embedding: &Embedding, params: &Params) -> Heading {
+    let counted = |fate: Fate| {
+        let n = found.of_fate(fate).count();
+        let length_mm = found.length_mm(fate);
+        let unit = unit::LengthUnit::choose(params.unit, 0.1 * length_mm);
+        format!("{n} {} ({} {})", fate.name(), unit::text(length_mm / unit.mm, 3), unit.sign)
+    };
+    let verdict = vec![
+        "baseline and follow-up on one shared map".to_owned(),
+        heading::verdict(embedding),
+        format!("branches: {}, {}, {}", counted(Fate::Matched), counted(Fate::Lost), counted(Fate::New)),
+    ];
+    let alignment = &found.alignment;
+    let mut facts = Vec::new();
+    if alignment.n_points > 0 {
+        let moved = if alignment.scale == 1.0 { "rigidly" } else { "by a similarity" };
+        let unit = unit::LengthUnit::choose(params.unit, alignment.residual_max_mm.max(1e-9));
+        let of_unit = |value: f64| format!("{} {}", unit::text(value / unit.mm, 2), unit.sign);
+        facts.push(format!(
+            "follow-up moved {moved} onto the baseline (turned by {:.1}°): matched forks are {} apart on average, {} at most",
+            alignment.angle_deg(),
+            of_unit(alignment.residual_mean_mm),
+            of_unit(alignment.residual_max_mm)
+        ));
+    }
+    facts.push("what both have is drawn at the baseline's lengths and bends".to_owned());
+    facts.push("thin lines: what the other one has".to_owned());
+    Heading { title: params.title.clone(), verdict, facts }
+}
+
+/// Colours by node: a palette value at both ends of its edge, for either panel.
+struct Colors {
+    /// The diverging scale alone, with its ticks, for the key.
+    key: Coloring,
+    /// The scale and the colours of loss, gain and neither.
+    palette: Palette,
+    ends: [Vec<[f32; 2]>; 2],
+    lost: Rgb,
+    new: Rgb,
+    neither: Rgb,
+}
+
+impl Colors {
+    fn new(found: &Juxtaposition, change: ChangeOf) -> Self {
+        let scale = Palette::changes();
+        let [lost, new, neither] = Palette::fates();
+        let (palette, factor, [of_lost, of_new, of_neither]) = scale.with([lost, new, neither]);
+        let changes: Vec<[f64; 2]> =
+            (0..found.nodes.len()).map(|node| changes_at(found, change, node)).collect();
+        let end = end_percent(found, change, &changes);
+        let value = |percent: f64| {
+            let share = (0.5 + 0.5 * percent / end).clamp(0.0, 1.0) as f32;
+            if percent.is_finite() { share * factor } else { of_neither }
+        };
+        let baseline = |node: &SharedNode| match node.fate {
+            Fate::Matched => [of_neither; 2],
+            Fate::Lost => [of_lost; 2],
+            Fate::New => [of_new; 2],
+        };
+        let followup = |(node, changes): (&SharedNode, &[f64; 2])| match node.fate {
+            Fate::Matched => changes.map(value),
+            _ => baseline(node),
+        };
+        let ends = [
+            found.nodes.iter().map(baseline).collect(),
+            found.nodes.iter().zip(&changes).map(followup).collect(),
+        ];
+        let caption = match change {
+            ChangeOf::Radius => "radius change (%)",
+            ChangeOf::Length => "length change (%)",
+        };
+        let most = changes.iter().flatten().copied().filter(|change| change.is_finite());
+        let (least, most) = most.fold((0.0, 0.0), |(low, high): (f64, f64), c| (low.min(c), high.max(c)));
+        let ticks = ticks(end, [least < -1.001 * end, most > 1.001 * end]);
+        let scale_of = Scale { caption: caption.to_owned(), ticks };
+        let key = Coloring { palette: scale, ends: Vec::new(), scale: Some(scale_of) };
+        Self { key, palette, ends, lost, new, neither }
+    }
+}
+
+/// The change at the upper and at the lower end of a node's edge, in percent; `NaN` where it is not known.
+fn changes_at(found: &Juxtaposition, change: ChangeOf, node: usize) -> [f64; 2] {
+    let Some(row) = found.nodes[node].row else { return [f64::NAN; 2] };
+    if change == ChangeOf::Length {
+        return [found.rows[row].length_change_percent(); 2];
+    }
+    let at = |node: usize| {
+        let SharedNode { baseline_radius_mm, followup_radius_mm, .. } = found.nodes[node];
+        change_percent([baseline_radius_mm.unwrap_or(f64::NAN), followup_radius_mm.unwrap_or(f64::NAN)])
+    };
+    // At a fork the incoming tube is drawn, so its change is shown there.
+    let above = found.shared.parent(node).map(at).filter(|change| change.is_finite());
+    [above.unwrap_or(at(node)), at(node)]
+}
+
+/// The end of a scale that tells nearly all changes apart, and the narrowest place of each branch.
+fn end_percent(found: &Juxtaposition, change: ChangeOf, changes: &[[f64; 2]]) -> f64 {
+    let known = |node: &usize| found.nodes[*node].fate == Fate::Matched && changes[*node][1].is_finite();
+    let mut spread: Vec<(f64, f64)> = (1..found.nodes.len())
+        .filter(known)
+        .map(|node| (changes[node][1].abs(), found.shared.edge_length_mm(node)))
+        .collect();
+    spread.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let total: f64 = spread.iter().map(|&(_, length)| length).sum();
+    let mut passed = 0.0;
+    let at_share = spread.iter().find(|&&(_, length)| {
+        passed += length;
+        passed >= SHARE_IN_SCALE * total
+    });
+    let narrowest = found.of_fate(Fate::Matched).map(|row| row.narrowest_percent.abs());
+    let narrowest = narrowest.filter(|percent| percent.is_finite() && change == ChangeOf::Radius);
+    let wanted = narrowest.fold(at_share.map_or(0.0, |&(percent, _)| percent), f64::max);
+    let [.., last] = ENDS_PERCENT;
+    ENDS_PERCENT.into_iter().find(|&end| end >= wanted).unwrap_or(last)
+}
+
+/// Five ticks: no change in the middle, signs on the others; `is_clipped` at either end.
+fn ticks(end: f64, is_clipped: [bool; 2]) -> Vec<Tick> {
+    [-1.0, -0.5, 0.0, 0.5, 1.0]
+        .into_iter()
+        .map(|share: f64| {
+            let number = unit::text((share * end).abs(), 3);
+            let beyond = match share {
+                -1.0 if is_clipped[0] => "≤ ",
+                1.0 if is_clipped[1] => "≥ ",
+                _ => "",
+            };
+            let sign = if share < 0.0 {
+                "−"
+            } else if share > 0.0 {
+                "+"
+            } else {
+                ""
+            };
+            Tick {
+                position: 0.5 + 0.5 * share,
+                text: format!("{beyond}{sign}{number}"),
+                is_mean: share == 0.0,
+            }
+        })
+        .collect()
+}
+
+/// One of the two trees in its place.
+struct Panel {
+    /// 0 for the baseline, 1 for the follow-up.
+    tree: usize,
+    page: Page,
+}
+
+struct Sheet {
+    panels: [Panel; 2],
+    groups: Vec<Group>,
+    height: u32,
+    style: Style,
+}
+
+struct Artist<'a> {
+    found: &'a Juxtaposition,
+    params: &'a Params,
+    scene: Scene,
+    coloring: Colors,
+    colors: PageColors,
+    face: Face,
+}
+
+impl Artist<'_> {
+    fn lay_out(&self, said: &Heading, names: [&str; 2]) -> Result<Sheet, Error> {
+        let (unit, margin) = (Page::unit_px(self.params.width_px), Page::margin_px(self.params.width_px));
+        let width = f64::from(self.params.width_px);
+        let (group, heading_px) = furniture::heading(&self.face, said, self.params.width_px, &self.colors);
+        let key_px = furniture::key_size(&self.face, &self.coloring.key, self.params.width_px);
+        let room = width - 2.0 * margin - KEY.max(key_px.x / unit) * unit - GAP * unit;
+        let (low_mm, high_mm) = self.scene.bounds_mm();
+        let size_mm = (high_mm - low_mm).max(DVec2::splat(1e-12));
+        let rim = 2.0 * RIM * unit;
+        let title_px = LEADING * TITLE * unit;
+        let scale = |wide: f64, high: f64| {
+            let inner = DVec2::new(wide - rim, high - rim).max(DVec2::splat(unit));
+            (inner / size_mm).min_element()
+        };
+        let beside = scale(0.5 * (room - GAP * unit), MOST_HEIGHT * width - title_px);
+        let below = scale(room, 0.5 * (MOST_HEIGHT * width - GAP * unit) - title_px);
+        let is_beside = beside * LEAST_GAIN_BELOW >= below;
+        let px_per_mm = if is_beside { beside } else { below };
+        let panel_px = size_mm * px_per_mm + rim;
+        let top = margin + heading_px + unit + title_px;
+        let step = if is_beside {
+            DVec2::new(panel_px.x + GAP * unit, 0.0)
+        } else {
+            DVec2::new(0.0, panel_px.y + title_px + GAP * unit)
+        };
+        let panel = |tree: usize| {
+            let low = (DVec2::new(margin, top) + step * tree as f64).floor();
+            let center_mm = 0.5 * (low_mm + high_mm);
+            let center_px = low + 0.5 * panel_px;
+            let origin_px = center_px - px_per_mm * DVec2::new(center_mm.x, -center_mm.y);
+            let pen = Pen { min_width_px: self.params.min_width_px, style: self.params.style };
+            let area = [low, low + panel_px];
+            let (width, height) = (self.params.width_px, 0);
+            Panel {
+                tree,
+                page: Page { width, height, unit_px: unit, px_per_mm, origin_px, area, key_at: low, pen },
+            }
+        };
+        let panels = [panel(0), panel(1)];
+        let key_at = DVec2::new(panels[1].page.area[1].x + GAP * unit, top);
+        let mut groups = vec![group];
+        let swatches_at = key_at + DVec2::new(0.0, key_px.y + 2.0 * unit);
+        let key_page = Page { key_at, ..panels[1].page };
+        groups.extend(furniture::key(&key_page, &self.coloring.key, self.params, &self.colors));
+        let (swatches, bottom) = self.swatches(swatches_at, unit);
+        groups.push(swatches);
+        for panel in &panels {
+            groups.push(self.panel_marks(panel, names[panel.tree], unit));
+        }
+        let lowest = panels[1].page.area[1].y.max(bottom);
+        let (width, height) = (self.params.width_px, (lowest + margin) as u32);
+        if u64::from(width) * u64::from(height) > MAX_PIXELS {
+            return Err(Error::TooLarge { width, height, limit: MAX_PIXELS });
+        }
+        let style = self.style(&panels);
+        Ok(Sheet { panels, groups, height, style })
+    }
+
+    /// Lines where radii would cover a panel several times over.
+    fn style(&self, panels: &[Panel; 2]) -> Style {
+        let is_thick = |panel: &Panel| {
+            let page = local(&panel.page);
+            let drawn = self.edges(panel.tree, &page, Style::PseudoSurface);
+            raster::layers(size_of(&page), &drawn) > MAX_LAYERS
+        };
+        if panels.iter().any(is_thick) { Style::Line } else { self.params.style }
+    }
+
+    /// Name and root of a panel.
+    fn panel_marks(&self, panel: &Panel, name: &str, unit: f64) -> Group {
+        let low = panel.page.area[0];
+        let root = furniture::root_mark(&panel.page, &self.found.shared, &self.scene, &self.colors);
+        let at = DVec2::new(low.x, low.y - 0.4 * TITLE * unit);
+        let mut marks = vec![self.text(at, TITLE * unit, true, name)];
+        marks.extend(root.marks);
+        Group { name: if panel.tree == 0 { "baseline" } else { "follow-up" }, marks }
+    }
+
+    /// What the colours beside the scale mean, and where that ends.
+    fn swatches(&self, at: DVec2, unit: f64) -> (Group, f64) {
+        let mut marks = Vec::new();
+        let mut middle = at;
+        let coloring = &self.coloring;
+        for (color, text) in [
+            (coloring.lost, "lost: baseline only"),
+            (coloring.new, "new: follow-up only"),
+            (coloring.neither, "baseline, or unknown"),
+        ] {
+            let (from, to) = (middle, middle + DVec2::new(2.4 * unit, 0.0));
+            marks.push(Mark::Line { from, to, width_px: 0.9 * unit, color });
+            let at = to + DVec2::new(0.7 * unit, 0.36 * SMALL * unit);
+            marks.push(self.text(at, SMALL * unit, false, text));
+            middle.y += LEADING * SMALL * unit;
+        }
+        (Group { name: "fates", marks }, middle.y)
+    }
+
+    fn text(&self, at: DVec2, size_px: f64, is_strong: bool, text: &str) -> Mark {
+        let (anchor, color) = (Anchor::Start, self.colors.ink);
+        Mark::Text { at, size_px, anchor, is_strong, color, text: text.to_owned() }
+    }
+
+    /// The radius of a node's tube in a tree, in mm; `None` where it has none.
+    fn radius_mm(&self, tree: usize, node: usize) -> Option<f64> {
+        let SharedNode { baseline_radius_mm, followup_radius_mm, .. } = self.found.nodes[node];
+        let radius_mm = if tree == 0 { baseline_radius_mm } else { followup_radius_mm };
+        radius_mm.map(|radius_mm| radius_mm * self.params.width_scale)
+    }
+
+    /// Whether a tree has the edge of a node.
+    fn has(&self, tree: usize, node: usize, parent: usize) -> bool {
+        self.radius_mm(tree, node).is_some() && self.radius_mm(tree, parent).is_some()
+    }
+
+    /// The edges as cones; those that a tree has not as threads.
+    fn edges(&self, tree: usize, page: &Page, style: Style) -> Vec<Drawn> {
+        let shared = &self.found.shared;
+        let page = Page { pen: Pen { style, ..page.pen }, ..*page };
+        let kinship = self.kinship(&page);
+        let center = |node: usize| page.px(self.scene.points_mm[node].truncate()).extend(0.0);
+        let ball = |node: usize, is_there: bool| {
+            let own = self.radius_mm(tree, node).filter(|_| is_there);
+            let thread = 0.5 * GHOST * page.pen.min_width_px;
+            Ball { center: center(node), radius: own.map_or(thread, |radius_mm| page.radius_px(radius_mm)) }
+        };
+        let drawn = |node: usize, parent: usize| {
+            let is_there = self.has(tree, node, parent);
+            // Only what is drawn alike goes on without a joint.
+            let before = shared.parent(parent).filter(|&before| {
+                shared.children(parent).len() == 1 && self.has(tree, parent, before) == is_there
+            });
+            let after = match shared.children(node) {
+                &[after] if self.has(tree, after, node) == is_there => Some(after),
+                _ => None,
+            };
+            let joint = |of: Option<usize>| of.map_or(Joint::End, |node| Joint::Chain(ball(node, is_there)));
+            let (mut from, to) = (ball(parent, is_there), ball(node, is_there));
+            if self.found.nodes[node].fate != self.found.nodes[parent].fate {
+                // What is lost or new must not colour the fork that stays.
+                from.radius = from.radius.min(to.radius);
+            }
+            Drawn {
+                node: node as u32,
+                cone: Cone::new(from, to, [joint(before), joint(after)]),
+                values: self.coloring.ends[tree][node],
+                arc_px: [kinship.arc_px[parent], kinship.arc_px[node]],
+            }
+        };
+        if shared.n_nodes() == 1 {
+            let only = ball(0, true);
+            let values = self.coloring.ends[tree][0];
+            return vec![Drawn {
+                node: 0,
+                cone: Cone::new(only, only, [Joint::End; 2]),
+                values,
+                arc_px: [0.0; 2],
+            }];
+        }
+        shared.edges().map(|(node, parent)| drawn(node, parent)).collect()
+    }
+
+    fn kinship(&self, page: &Page) -> Kinship {
+        Kinship::new(&self.found.shared, &self.found.shared.branches(), &self.scene, page.px_per_mm)
+    }
+
+    fn draw(&self, panel: &Panel, style: Style, pixels: &mut [Pixel]) {
+        let page = local(&panel.page);
+        let size = size_of(&page);
+        let drawn = raster::rasterise(&Job {
+            size,
+            drawn: &self.edges(panel.tree, &page, style),
+            kinship: &self.kinship(&page),
+            palette: &self.coloring.palette,
+            colors: self.colors,
+            style,
+            has_depth: false,
+        });
+        let width = self.params.width_px as usize;
+        let corner = [panel.page.area[0].x as usize, panel.page.area[0].y as usize];
+        let n_columns = size[0].min(width.saturating_sub(corner[0]));
+        for (row, line) in drawn.chunks(size[0]).enumerate() {
+            let start = (corner[1] + row) * width + corner[0];
+            if let Some(target) = pixels.get_mut(start..start + n_columns) {
+                target.copy_from_slice(&line[..n_columns]);
+            }
+        }
+    }
+
+    fn svg(&self, sheet: &Sheet, title: &str) -> String {
+        let (width, height) = (self.params.width_px, sheet.height);
+        let mut out = String::new();
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            out,
+            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" \
+             xmlns:xlink=\"http://www.w3.org/1999/xlink\" version=\"1.1\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
+             data-format=\"espalier-juxtaposition-svg\" data-version=\"1\">\n<title>{}</title>\n\
+             <rect id=\"background\" width=\"{width}\" height=\"{height}\" fill=\"{}\"/>",
+            svg::escaped(title),
+            hex(self.colors.background)
+        );
+        for panel in &sheet.panels {
+            let page = Page { pen: Pen { style: sheet.style, ..panel.page.pen }, ..panel.page };
+            self.write_tree(&mut out, panel.tree, &page);
+        }
+        svg::write_groups(&mut out, &sheet.groups);
+        out.push_str("</svg>\n");
+        out
+    }
+
+    /// A tree as one path for each run of edges of one row and one fate.
+    fn write_tree(&self, out: &mut String, tree: usize, page: &Page) {
+        let name = ["baseline", "follow-up"][tree];
+        let _ =
+            writeln!(out, "<g id=\"{name}-branches\" stroke-linecap=\"round\" stroke-linejoin=\"round\">");
+        let mut runs = self.runs(tree);
+        // Threads at the bottom, then thick over thin as in the raster.
+        let width_mm = |run: &Run| {
+            run.nodes[1..].iter().filter_map(|&node| self.radius_mm(tree, node)).fold(0.0, f64::max)
+        };
+        runs.sort_by(|a, b| a.is_there.cmp(&b.is_there).then(width_mm(a).total_cmp(&width_mm(b))));
+        if page.pen.style == Style::PseudoSurface {
+            let rim = hex(self.colors.rim);
+            let _ = writeln!(out, "<g stroke=\"{rim}\" stroke-opacity=\"0.75\" stroke-width=\"1.3\">");
+            for (run_idx, _) in runs.iter().enumerate().filter(|(_, run)| run.is_there) {
+                let _ = writeln!(out, "<use xlink:href=\"#{name}-{run_idx}\"/>");
+            }
+            out.push_str("</g>\n");
+        }
+        for (run_idx, run) in runs.iter().enumerate() {
+            self.write_run(out, (tree, name, run_idx), run, page);
+        }
+        out.push_str("</g>\n");
+    }
+
+    fn runs(&self, tree: usize) -> Vec<Run> {
+        let mut runs: Vec<Run> = Vec::new();
+        for (node, parent) in self.found.shared.edges() {
+            let is_there = self.has(tree, node, parent);
+            let key = (self.found.nodes[node].row, self.found.nodes[node].fate, is_there);
+            match runs.last_mut() {
+                Some(run) if run.nodes.last() == Some(&parent) && run.key == key => run.nodes.push(node),
+                _ => runs.push(Run { key, is_there, nodes: vec![parent, node] }),
+            }
+        }
+        runs
+    }
+
+    fn write_run(
+        &self,
+        out: &mut String,
+        (tree, name, run_idx): (usize, &str, usize),
+        run: &Run,
+        page: &Page,
+    ) {
+        let own = &run.nodes[1..];
+        let mean = own.iter().map(|&node| self.coloring.ends[tree][node][1]).sum::<f32>() / own.len() as f32;
+        let fill = hex(self.coloring.palette.at(mean));
+        let center = |node: usize| page.px(self.scene.points_mm[node].truncate());
+        let row = run.key.0.unwrap_or(0);
+        let ids = format!(
+            "id=\"{name}-{run_idx}\" data-row=\"{row}\" data-fate=\"{}\" data-present=\"{}\"",
+            run.key.1.name(),
+            run.is_there
+        );
+        if run.is_there && page.pen.style == Style::PseudoSurface {
+            let radius = |place: usize| {
+                // At a fork the run begins with its own tube.
+                let node = if place == 0 && self.found.nodes[run.nodes[0]].row != run.key.0 {
+                    own[0]
+                } else {
+                    run.nodes[place]
+                };
+                page.radius_px(self.radius_mm(tree, node).unwrap_or(0.0))
+            };
+            let points: Vec<(DVec2, f64)> =
+                run.nodes.iter().enumerate().map(|(place, &node)| (center(node), radius(place))).collect();
+            let _ = writeln!(out, "<path {ids} d=\"{}\" fill=\"{fill}\"/>", outline(&points));
+            return;
+        }
+        let mut path = String::new();
+        for (place, &node) in run.nodes.iter().enumerate() {
+            let at = center(node);
+            let _ = write!(path, "{}{:.2} {:.2}", if place == 0 { "M" } else { "L" }, at.x, at.y);
+        }
+        let width = page.pen.min_width_px * if run.is_there { 1.0 } else { GHOST };
+        let _ = writeln!(
+            out,
+            "<path {ids} d=\"{path}\" fill=\"none\" stroke=\"{fill}\" stroke-width=\"{width:.2}\"/>"
+        );
+    }
+}
+
+/// Edges that follow on one another, of one row and fate, which a tree has or has not.
+struct Run {
+    key: (Option<usize>, Fate, bool),
+    is_there: bool,
+    /// From the node that it hangs from.
+    nodes: Vec<usize>,
+}
+
+/// The page of a panel in the panel's own pixels.
+fn local(page: &Page) -> Page {
+    let [low, high] = page.area;
+    let size = (high - low).ceil().max(DVec2::ONE);
+    Page {
+        width: size.x as u32,
+        height: size.y as u32,
+        origin_px: page.origin_px - low,
+        area: [DVec2::ZERO, size],
+        ..*page
+    }
+}
+
+fn size_of(page: &Page) -> [usize; 2] {
+    [page.width as usize, page.height as usize]
+}
