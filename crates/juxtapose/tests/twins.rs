@@ -87,6 +87,7 @@ fn a_tree_is_itself() {
             }
             assert_eq!(found.shared, tree, "the shared tree is the baseline");
             assert!(found.alignment.residual_max_mm < 1e-4);
+            assert!(!found.to_json().contains("\"length_mm\":-"), "nothing lost is 0 mm, not -0");
         }
     }
 }

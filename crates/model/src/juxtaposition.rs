@@ -232,7 +232,8 @@ impl Juxtaposition {
     /// The length of the branches of a fate in the tree that has them, in mm; of matched ones the baseline's.
     #[must_use]
     pub fn length_mm(&self, fate: Fate) -> f64 {
-        self.of_fate(fate).map(|row| row.length_mm[usize::from(fate == Fate::New)]).sum()
+        // The sum of nothing is −0.
+        self.of_fate(fate).map(|row| row.length_mm[usize::from(fate == Fate::New)]).sum::<f64>() + 0.0
     }
 
     /// The table `juxtaposition.tsv`.
