@@ -86,6 +86,15 @@ pub fn free_ends(tree: &Tree) -> Vec<usize> {
     (0..tree.n_nodes()).filter(|&node| n_edges(node) == 1).collect()
 }
 
+/// The free ends of the true tree that have none of the found tree for themselves.
+#[must_use]
+pub fn lost_tips(truth: &Tree, found: &Tree, spacing_mm: DVec3) -> Vec<usize> {
+    let (mut tips, found_tips) = (free_ends(truth), free_ends(found));
+    let pairs = matched((truth, &tips), (found, &found_tips), 2.0 * spacing_mm.max_element());
+    tips.retain(|tip| pairs.iter().all(|(matched, _)| matched != tip));
+    tips
+}
+
 /// One-to-one pairs of true and found nodes, nearest first, within max(`tolerance_mm`, the true radius).
 pub(crate) fn matched(
     (truth, true_nodes): (&Tree, &[usize]),

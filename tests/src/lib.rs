@@ -2,6 +2,7 @@
 
 pub mod degenerate;
 pub mod ground_truth;
+pub mod peer_ends;
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};

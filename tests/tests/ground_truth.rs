@@ -4,6 +4,7 @@
 use espalier_geom::space::nearest_parameter;
 use espalier_phantom::Kind;
 use espalier_tests::ground_truth::phantoms::{Case, Scan, measure, tree_of};
+use espalier_tests::peer_ends::{self, Reason};
 use espalier_tests::real_data;
 use espalier_tree::Root;
 use glam::DVec3;
@@ -58,4 +59,31 @@ fn an_aorta_as_vmtk_has_it() {
     let median = ratios[ratios.len() / 2];
     assert!(mean_mm <= 1.0, "{mean_mm} mm");
     assert!((0.95..=1.05).contains(&median), "{median}");
+}
+
+/// Every end of another program's skeleton of an airway on slices of 3 mm: there, or passed by, or explained.
+#[test]
+fn the_ends_of_a_peer_are_found() {
+    let Some(data) = real_data() else { return };
+    let options = espalier_volume::ReadOptions::default();
+    let read = |path: &str| {
+        let params = espalier_volume::Params {
+            method: espalier_volume::Method::Mask,
+            fill_cavities: false,
+            close_tunnels: false,
+            ..Default::default()
+        };
+        espalier_volume::read_mask(&data.join(path), &options, &params).expect("a mask").mask
+    };
+    let (mask, peer) = (read("volumes/airquant_airway.nii.gz"), read("reference/airquant/FIXskel.nii.gz"));
+    let tree = tree_of(&mask, Root::Superior).expect("a tree").tree;
+    let ends = peer_ends::compare(&peer, &tree);
+    let table = ends.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
+    let n_of = |is_such: fn(&Reason) -> bool| ends.iter().filter(|end| is_such(&end.reason)).count();
+    assert_eq!(ends.len(), 31);
+    // One is a single voxel that hangs off a fork's lower rim; the tree moves that fork up its parent.
+    assert!(n_of(|reason| matches!(reason, Reason::Lost(_))) <= 1, "{table}");
+    let n_found =
+        n_of(|reason| matches!(reason, Reason::SameEnd | Reason::RunsOn(_) | Reason::EndOfSphere(_)));
+    assert!(n_found >= 26 && n_of(|reason| *reason == Reason::SameEnd) >= 13, "{table}");
 }

@@ -45,6 +45,11 @@ impl Depths {
         Self { words, depths: chamfer(lattice) }
     }
 
+    /// The foreground cells of a word of the lattice, as it was.
+    pub(crate) fn foreground(&self, word: usize) -> u64 {
+        self.words[word].0
+    }
+
     /// The cells by level, from the shallowest, as words and bits in raster order: level i holds the depths from
     /// i · `step`, without it, to (i + 1) · `step`.
     pub(crate) fn levels(&self, step: u16) -> Vec<Vec<(usize, u64)>> {
@@ -175,7 +180,7 @@ impl Pass {
 }
 
 /// Costs of steps over (|dx|, |dy|, |dz|), each 0 or 1.
-fn weights(spacing: [f64; 3]) -> [[[u16; 2]; 2]; 2] {
+pub(crate) fn weights(spacing: [f64; 3]) -> [[[u16; 2]; 2]; 2] {
     let smallest = spacing.into_iter().fold(f64::INFINITY, f64::min);
     [0, 1].map(|dx| {
         [0, 1].map(|dy| {

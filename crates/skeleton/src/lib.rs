@@ -9,6 +9,7 @@
 //! | 5 | `thinning` | peel border voxels from six sides until nothing changes (`lee94`) |
 //! | 6 | `depth`, `safe` | the same, level by level of depth in mm, with tips that hold (`safe`) |
 //! | 7 | `tips` | move tips to where they belong (`safe`) |
+//! | 8 | `restore` | bring back the branches that are missing (`safe`) |
 //!
 //! Connectivity is 26 for the foreground and 6 for the background throughout. Thinning settles ties by storage order, so
 //! masks should come with their axes towards right, anterior, superior, as the stage before hands them on.
@@ -31,6 +32,7 @@ mod depth;
 mod euler;
 mod lattice;
 mod open;
+mod restore;
 mod safe;
 mod simple;
 mod thinning;

@@ -8,7 +8,8 @@
 //! 1. is no end voxel, or is a tooth;
 //! 2. is no corner made by the sub-iteration itself.
 //!
-//! Then the tips are moved to where they belong ([`crate::tips`]).
+//! Then the tips are moved to where they belong ([`crate::tips`]), and branches that are missing come back
+//! ([`crate::restore`]).
 //!
 //! **Guarantees** only simple voxels are deleted, one after the other, so components, tunnels and cavities stay, and
 //! no component vanishes. A level peels all sides at the same speed, whatever their direction.
@@ -28,6 +29,7 @@ use crate::depth::{Depths, UNITS_PER_SPACING};
 use crate::euler::EulerTable;
 use crate::lattice::Lattice;
 use crate::open::Open;
+use crate::restore;
 use crate::simple::{is_corner, is_simple, n_neighbors};
 use crate::thinning::{Rule, sweep_until_stable};
 use crate::tips;
@@ -46,6 +48,10 @@ pub(crate) fn thin(lattice: &mut Lattice) -> usize {
         n_sweeps += sweep_until_stable(lattice, &mut open, &rule);
     }
     tips::settle(lattice, &depths);
+    if restore::lost_branches(lattice, &depths) > 0 {
+        // Where a branch begins, cells of the curve that it left may no longer be needed.
+        n_sweeps += sweep_until_stable(lattice, &mut Open::border(lattice), &rule);
+    }
     n_sweeps
 }
 

