@@ -11,10 +11,10 @@ use maud::{Markup, html};
 
 use crate::facts::Facts;
 use crate::layout::{Frame, bounds};
-use crate::length::number;
 use crate::losses::angle3d_deg;
 use crate::page::{Head, absent, table};
 use crate::strokes::{self, Budget, Subject};
+use crate::verdict::degrees;
 
 const BUDGET: Budget = Budget { pieces: 30_000, points: 18_000 };
 /// The layouts that are drawn, those of the fewest crossings first; all are in the table.
@@ -115,7 +115,7 @@ fn picture(facts: &Facts<'_>, (layout, name): (&ComparedLayout, &str), frame: &F
             }
             figcaption {
                 b { (name) } ": " (row.crossings) " crossings, "
-                (number(row.losses.angle3d_error_mean_deg, 3)) "° off in space on average"
+                (degrees(row.losses.angle3d_error_mean_deg)) " off in space on average"
             }
         }
     }

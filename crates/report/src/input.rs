@@ -44,7 +44,7 @@ fn description(facts: &Facts<'_>) -> Markup {
         }
         rows.push(("Shape", format!("{} voxels", grid.shape().map(|extent| extent.to_string()).join(" × "))));
         rows.push(("Spacing", format!("{} mm", join(grid.spacing_mm().to_array()))));
-        rows.push(("Orientation", orientation(&grid.orientation())));
+        rows.push(("Axes of the mask", orientation(&grid.orientation())));
         let n_foreground = mask.n_foreground();
         let millilitres = n_foreground as f64 * grid.voxel_volume_mm3() / 1000.0;
         rows.push(("Mask", format!("{} voxels, {} ml", grouped(n_foreground), number(millilitres, 3))));

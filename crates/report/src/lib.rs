@@ -126,7 +126,7 @@ fn sections(facts: &Facts<'_>, params: &Params, written: &methods::Written) -> R
     Ok(vec![
         section("verdict", "Verdict", verdict::body(facts)),
         section("input", "Input", input::body(facts)?),
-        section("tree", "Tree in the mask", projections::body(facts)?),
+        section("tree", "Tree in space", projections::body(facts)?),
         section("map", "Planar map", map::body(facts)),
         section("methods-compared", "Beside other methods", flicker::body(facts)),
         section("worst", "Where most is lost", worst::body(facts)),

@@ -277,8 +277,12 @@ fn values(facts: &Facts<'_>, branches: &Branches, is_own: &[bool]) -> serde_json
 
 /// A number with three digits; nothing where there is none.
 fn short(value: f64) -> serde_json::Value {
+    /// What is less is rounding.
+    const LEAST: f64 = 1e-4;
     if !value.is_finite() {
         return serde_json::Value::Null;
     }
-    number(value, 3).parse::<f64>().map_or(serde_json::Value::Null, Into::into)
+    number(if value.abs() < LEAST { 0.0 } else { value }, 3)
+        .parse::<f64>()
+        .map_or(serde_json::Value::Null, Into::into)
 }

@@ -126,10 +126,10 @@ fn overlaps(facts: &Facts<'_>) -> Check {
     let meaning = if widths.overlaps == 0 {
         "No two tubes overlap at their true width.".to_owned()
     } else if widths.are_impossible() {
-        "Pairs of tubes overlap at true width; their area shows that no layout with exact lengths has room for all.".into()
+        "pairs of tubes overlap at true width; their area shows that no layout with exact lengths has room for all.".into()
     } else {
         format!(
-            "Pairs of tubes overlap at true width although their centrelines do not cross; at {} of the width none would.",
+            "pairs of tubes overlap at true width although their centrelines do not cross; at {} of the width none would.",
             percent(widths.radius_scale)
         )
     };
@@ -212,21 +212,21 @@ fn of_ledger(facts: &Facts<'_>) -> Vec<Check> {
         return vec![Check { status: Status::Unknown, what: "Topology", found: "unknown".into(), meaning }];
     };
     let kinds = [
-        (LedgerKind::LoopCut, "Loops cut", "places where branches met in a ring and one edge was removed."),
-        (LedgerKind::SpurPruned, "Spurs pruned", "short stubs taken for noise of the surface."),
+        (LedgerKind::LoopCut, "Loops cut", "where branches met in a ring, by removing one edge each."),
+        (
+            LedgerKind::SpurPruned,
+            "Spurs pruned",
+            "too short against the calibre they hang from: noise of the surface.",
+        ),
         (
             LedgerKind::TunnelClosed,
             "Tunnels closed",
-            "pinholes or bridges of the mask mended before thinning.",
+            "faults of the mask, mended by a few voxels each before thinning.",
         ),
-        (
-            LedgerKind::ComponentDropped,
-            "Islands dropped",
-            "pieces of the mask that are not part of the tree.",
-        ),
-        (LedgerKind::GapBridged, "Gaps bridged", "pieces of the mask joined to the tree by a straight edge."),
-        (LedgerKind::RadiusRepaired, "Radii repaired", "radii that were missing or impossible."),
-        (LedgerKind::RootResolved, "Roots resolved", "further roots of the traced tree, dropped or joined."),
+        (LedgerKind::ComponentDropped, "Islands dropped", "apart from the tree in the mask."),
+        (LedgerKind::GapBridged, "Gaps bridged", "from the tree to what was apart, by a straight edge each."),
+        (LedgerKind::RadiusRepaired, "Radii repaired", "where they were missing or impossible."),
+        (LedgerKind::RootResolved, "Roots resolved", "beyond the first, dropped or joined."),
     ];
     let always = if facts.is_of_scan() { 4 } else { 0 };
     let shown = kinds.into_iter().enumerate().map(|(i, kind)| (i < always, kind));
