@@ -18,32 +18,20 @@ use espalier_geom::math;
 use glam::DVec2;
 
 use crate::problem::Problem;
+use crate::runs::{Box2, Lanes, MIXED, RUN, is_same_fan};
 
-/// Edges in a run: eight single-precision borders are one or two vector registers.
-const RUN: usize = 8;
 /// The tolerance as a share of the median edge length, and the least angle between siblings in rad.
 pub(crate) const TOLERANCE: f64 = 1e-6;
 /// Edges from one node whose directions differ by more do not meet.
 const SAME_DIRECTION_RAD: f64 = 2.0 * TOLERANCE;
-/// Two units in the last place of single precision, by which a border is moved outwards.
-const OUTWARDS: f32 = 2.4e-7;
-
 /// What a particle's check needs; one per thread.
 #[derive(Default)]
 pub(crate) struct Scratch {
-    /// The boxes of each run's edges; lane i of run k is the edge above node 8 k + i + 1.
+    /// The boxes of each run's edges in median edge lengths, grown by half the tolerance; lane i of run k is the edge
+    /// above node 8 k + i + 1.
     lanes: Vec<Lanes>,
     /// The boxes of runs, by left border.
     runs: Vec<RunBox>,
-}
-
-/// A box in units of the median edge length, grown by half the tolerance.
-#[derive(Clone, Copy)]
-struct Box2 {
-    x_low: f32,
-    x_high: f32,
-    y_low: f32,
-    y_high: f32,
 }
 
 #[derive(Clone, Copy)]
@@ -52,58 +40,6 @@ struct RunBox {
     run: u32,
     /// The node from which all edges of the run come, or `MIXED`.
     hub: u32,
-}
-
-/// The hub of a run whose edges come from several nodes.
-const MIXED: u32 = u32::MAX;
-
-/// The boxes of up to eight edges; lanes without an edge meet nothing.
-#[derive(Clone, Copy)]
-struct Lanes {
-    x_low: [f32; RUN],
-    x_high: [f32; RUN],
-    y_low: [f32; RUN],
-    y_high: [f32; RUN],
-}
-
-impl Lanes {
-    const EMPTY: Self = Self {
-        x_low: [f32::INFINITY; RUN],
-        x_high: [f32::NEG_INFINITY; RUN],
-        y_low: [f32::INFINITY; RUN],
-        y_high: [f32::NEG_INFINITY; RUN],
-    };
-
-    #[inline]
-    fn set(&mut self, lane: usize, bounds: Box2) {
-        self.x_low[lane] = bounds.x_low;
-        self.x_high[lane] = bounds.x_high;
-        self.y_low[lane] = bounds.y_low;
-        self.y_high[lane] = bounds.y_high;
-    }
-
-    #[inline]
-    fn get(&self, lane: usize) -> Box2 {
-        Box2 {
-            x_low: self.x_low[lane],
-            x_high: self.x_high[lane],
-            y_low: self.y_low[lane],
-            y_high: self.y_high[lane],
-        }
-    }
-
-    /// One bit for each lane whose box meets `bounds`.
-    #[inline]
-    fn meeting(&self, bounds: Box2) -> u32 {
-        // No branches and a fixed length: this becomes a few vector comparisons.
-        let is_met: [u32; RUN] = std::array::from_fn(|lane| {
-            u32::from(self.x_low[lane] <= bounds.x_high)
-                & u32::from(bounds.x_low <= self.x_high[lane])
-                & u32::from(self.y_low[lane] <= bounds.y_high)
-                & u32::from(bounds.y_low <= self.y_high[lane])
-        });
-        is_met.iter().enumerate().fold(0, |bits, (lane, met)| bits | met << lane)
-    }
 }
 
 /// Whether no pair of edges meets.
@@ -162,22 +98,14 @@ impl Check<'_> {
         scratch.lanes.resize(n_runs, Lanes::EMPTY);
         scratch.runs.clear();
         for (run, lanes) in scratch.lanes.iter_mut().enumerate() {
-            let mut all = Box2 {
-                x_low: f32::INFINITY,
-                x_high: f32::NEG_INFINITY,
-                y_low: f32::INFINITY,
-                y_high: f32::NEG_INFINITY,
-            };
+            let mut all = Box2::EMPTY;
             for lane in 0..RUN.min(n_edges - run * RUN) {
                 let node = run * RUN + lane + 1;
                 let parent = self.problem.parent[node] as usize;
-                let (x_low, x_high) = grown(self.x[node] * per_mm, self.x[parent] * per_mm);
-                let (y_low, y_high) = grown(self.y[node] * per_mm, self.y[parent] * per_mm);
-                lanes.set(lane, Box2 { x_low, x_high, y_low, y_high });
-                all.x_low = all.x_low.min(x_low);
-                all.x_high = all.x_high.max(x_high);
-                all.y_low = all.y_low.min(y_low);
-                all.y_high = all.y_high.max(y_high);
+                let of = |node: usize| (self.x[node] * per_mm, self.y[node] * per_mm);
+                let bounds = Box2::around(of(node), of(parent), 0.5 * TOLERANCE);
+                lanes.set(lane, bounds);
+                all = all.joined(&bounds);
             }
             let edges = run * RUN + 1..(run * RUN + RUN).min(n_edges) + 1;
             let hub = self.problem.parent[edges.start];
@@ -273,19 +201,6 @@ impl Check<'_> {
             segments_meet(edge_a, edge_b, self.tolerance)
         }
     }
-}
-
-/// Whether two runs are of edges from one node.
-#[inline]
-fn is_same_fan(hub: u32, other: u32) -> bool {
-    hub != MIXED && hub == other
-}
-
-/// The interval between two numbers, grown by half the tolerance and rounded outwards.
-#[inline]
-fn grown(a: f64, b: f64) -> (f32, f32) {
-    let (low, high) = ((a.min(b) - 0.5 * TOLERANCE) as f32, (a.max(b) + 0.5 * TOLERANCE) as f32);
-    (low - low.abs() * OUTWARDS, high + high.abs() * OUTWARDS)
 }
 
 /// Whether two edges from one hub point the same way to within the tolerance.

@@ -5,7 +5,7 @@
 //! | 1 | `targets`, `siblings` | target angles, lengths and headings from the tree and its views |
 //! | 2 | `problem`, `weights`, `ratio`, `prospect` | the frozen problem; the user's weights; equation 3 between angles and ratios; whether a search is worth it |
 //! | 3 | `layout/…` | the methods: `projection`, `radial`, `cone`, `marino`, `pso` (with `start`) |
-//! | 4 | `batch`, `trig`, `crossing` | the swarm's energy, many particles at once, and its strict crossing count |
+//! | 4 | `batch`, `trig`, `crossing`, `runs` | the swarm's energy, many particles at once, and its strict crossing count |
 //! | 5 | `pose` | one rigid motion of the whole, mirrored or not; rounding to what is written |
 //! | 6 | `certify`, `widths/…`, `boxes` | the exact certificate; layouts at the widths of their tubes; boxes that meet |
 //! | 7 | `energy`, `losses/…`, `distances` | the one energy and all losses, for every method alike |
@@ -43,6 +43,7 @@ mod problem;
 mod prospect;
 mod ratio;
 mod replay;
+mod runs;
 mod select;
 mod separation;
 mod siblings;

@@ -9,7 +9,7 @@
 //! | | `shape`, `work` | a layout by its ratios; the budget |
 //! | | `linkage`, `joint`, `deviation` | a layout as a linkage: what a change of some ratios moves, gains and hits |
 //! | | `placement` | the placement term while subtrees turn |
-//! | | `hierarchy`, `similarity`, `grid` | who may be near whom: boxes over subtrees that move as a whole, cells |
+//! | | `hierarchy`, `similarity` | who may be near whom: boxes over subtrees that move as a whole |
 //! | | `repair` | manual edits: a layout of which a part is pinned, freed of crossings |
 //!
 //! **Input** the problem, and crossing-free headings. **Output** a layout without crossings, why the search ended,
@@ -29,7 +29,6 @@ pub(crate) mod barrier;
 mod checks;
 mod descent;
 mod deviation;
-mod grid;
 mod hierarchy;
 mod joint;
 mod linkage;

@@ -105,6 +105,12 @@ impl Spacing for TubeSpacing<'_> {
         self.reach_mm
     }
 
+    fn floor_reach_mm(&self) -> f64 {
+        let widest_mm = (1..self.problem.n_nodes()).map(|e| self.tubes.radius_mm(e)).fold(0.0, f64::max);
+        let beyond_mm = 2.0 * (APART - 1.0) * widest_mm;
+        self.separation.clearance_mm.max(self.separation.tolerance_mm()).max(beyond_mm)
+    }
+
     fn halve_reach(&mut self) -> bool {
         false
     }

@@ -8,6 +8,11 @@
 use espalier_geom::math;
 use glam::DVec2;
 
+use super::pairs::Bounds;
+
+/// Both ends of both edges of a pair.
+pub(super) type Ends = ((DVec2, DVec2), (DVec2, DVec2));
+
 /// The nearest points of two segments.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Contact {
@@ -48,6 +53,52 @@ impl Contact {
         let distance = squared.sqrt();
         Self { distance, along_first, along_second, normal: apart * inverse_or_zero(distance) }
     }
+}
+
+/// What the barrier of one pair is, and does: its value, infinite where the edges meet, and its derivative by the
+/// first edge's nearest point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Push {
+    pub(super) value: f64,
+    pub(super) on_first: DVec2,
+    pub(super) along_first: f64,
+    pub(super) along_second: f64,
+}
+
+impl Push {
+    pub(super) const NONE: Self =
+        Self { value: 0.0, on_first: DVec2::ZERO, along_first: 0.0, along_second: 0.0 };
+
+    /// Of two edges by their ends.
+    pub(super) fn between((p, q): Ends, bounds: &Bounds) -> Self {
+        if are_apart(p, q, bounds.floor_mm + bounds.width_mm) {
+            return Self::NONE;
+        }
+        Self::of(&Contact::between(p, q), bounds)
+    }
+
+    /// Of two edges by their nearest points.
+    pub(super) fn of(contact: &Contact, bounds: &Bounds) -> Self {
+        let u = (contact.distance - bounds.floor_mm) / bounds.width_mm;
+        if u >= 1.0 {
+            return Self::NONE;
+        }
+        if u <= 0.0 {
+            return Self { value: f64::INFINITY, ..Self::NONE };
+        }
+        let (value, slope, _) = barrier(u);
+        let on_first = contact.normal * (slope / bounds.width_mm);
+        Self { value, on_first, along_first: contact.along_first, along_second: contact.along_second }
+    }
+}
+
+/// Whether two segments are farther apart than `reach` for sure: the discs about them are.
+pub(super) fn are_apart((p0, p1): (DVec2, DVec2), (q0, q1): (DVec2, DVec2), reach: f64) -> bool {
+    let between = 0.5 * ((p0 + p1) - (q0 + q1));
+    let (p, q) = ((p1 - p0).length_squared(), (q1 - q0).length_squared());
+    // (a + b)² ≤ 2 (a² + b²) spares the roots: half lengths are √p / 2 and √q / 2.
+    let halves = (0.5 * (p + q)).sqrt();
+    between.length_squared() > (halves + reach) * (halves + reach)
 }
 
 fn inverse_or_zero(x: f64) -> f64 {

@@ -96,8 +96,8 @@ pub(super) fn descend<S: Spacing>(
     work: &mut Work,
 ) -> Outcome {
     let mut value = field.value(x, work);
-    let mut outcome =
-        Outcome { loss_before: value.loss, loss_after: value.loss, evaluations: 1, ..Outcome::default() };
+    let loss = if value.total.is_finite() { value.loss } else { field.loss(x) };
+    let mut outcome = Outcome { loss_before: loss, loss_after: loss, evaluations: 1, ..Outcome::default() };
     if !value.total.is_finite() {
         return outcome;
     }

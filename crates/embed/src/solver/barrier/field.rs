@@ -16,11 +16,10 @@ use std::f64::consts::{PI, TAU};
 use espalier_geom::angle::wrap;
 use espalier_geom::math;
 use glam::DVec2;
-use rayon::prelude::*;
 
 use super::super::work::Work;
-use super::contact::{Contact, barrier};
-use super::pairs::{Pair, PairList, Spacing, are_apart};
+use super::contact::{Contact, Ends, are_apart, barrier};
+use super::pairs::{Pair, PairList, Spacing};
 use crate::paths::Paths;
 use crate::problem::Problem;
 use crate::ratio;
@@ -31,7 +30,7 @@ const FOLDED_RAD: f64 = 1e-6;
 /// What an evaluation finds.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Value {
-    /// E: length, angle and placement terms.
+    /// E: length, angle and placement terms; infinite if edges meet.
     pub(super) loss: f64,
     /// E + μ Σ b; infinite if edges meet.
     pub(super) total: f64,
@@ -39,43 +38,6 @@ pub(super) struct Value {
 
 /// The six sums from which the curvature by a rotation about any point follows, and by a shift along any line.
 type Moments = [f64; 6];
-
-/// Pairs that one thread takes at once.
-const PAIRS_PER_CHUNK: usize = 4096;
-
-/// What the barrier of one pair is, and does: its value, infinite where the edges meet, and its derivative by the
-/// first edge's nearest point.
-#[derive(Clone, Copy, Debug)]
-struct Push {
-    value: f64,
-    on_first: DVec2,
-    along_first: f64,
-    along_second: f64,
-}
-
-impl Push {
-    const NONE: Self = Self { value: 0.0, on_first: DVec2::ZERO, along_first: 0.0, along_second: 0.0 };
-
-    fn of(Pair { bounds, .. }: &Pair, (p, q): Ends) -> Self {
-        if are_apart(p, q, bounds.floor_mm + bounds.width_mm) {
-            return Self::NONE;
-        }
-        let contact = Contact::between(p, q);
-        let u = (contact.distance - bounds.floor_mm) / bounds.width_mm;
-        if u >= 1.0 {
-            return Self::NONE;
-        }
-        if u <= 0.0 {
-            return Self { value: f64::INFINITY, ..Self::NONE };
-        }
-        let (value, slope, _) = barrier(u);
-        let on_first = contact.normal * (slope / bounds.width_mm);
-        Self { value, on_first, along_first: contact.along_first, along_second: contact.along_second }
-    }
-}
-
-/// Both ends of both edges of a pair.
-type Ends = ((DVec2, DVec2), (DVec2, DVec2));
 
 fn ends(problem: &Problem, positions: &[DVec2], pair: &Pair) -> Ends {
     let of = |edge: u32| (positions[problem.parent[edge as usize] as usize], positions[edge as usize]);
@@ -90,7 +52,6 @@ pub(super) struct Field<'a, S> {
     /// μ.
     strength: f64,
     pairs: PairList,
-    pushes: Vec<Push>,
     /// Pairs that met in the last evaluation.
     pub(super) met: Vec<(u32, u32)>,
     pub(super) positions: Vec<DVec2>,
@@ -115,7 +76,6 @@ impl<'a, S: Spacing> Field<'a, S> {
             spacing,
             strength,
             pairs: PairList::new(problem),
-            pushes: Vec::new(),
             met: Vec::new(),
             positions: vec![DVec2::ZERO; n_nodes],
             turn: vec![0.0; n_nodes],
@@ -144,16 +104,35 @@ impl<'a, S: Spacing> Field<'a, S> {
     pub(super) fn value(&mut self, x: &[f64], work: &mut Work) -> Value {
         self.n_evaluations += 1;
         self.place(x);
-        if self.pairs.is_stale(&self.positions) {
-            self.pairs.rebuild(self.problem, &mut self.spacing, &self.positions, work);
-        }
-        work.spend(self.problem.n_nodes() + self.pairs.pairs.len());
+        work.spend(self.problem.n_nodes());
         self.met.clear();
         self.find_folds();
+        let is_stale = self.pairs.is_stale(&self.positions);
+        if is_stale {
+            // Most trial steps end in a crossing, and need no list.
+            self.pairs.find_met((self.problem, &self.spacing, &self.positions), &mut self.met, work);
+        }
+        if !self.met.is_empty() {
+            return Value { loss: f64::INFINITY, total: f64::INFINITY };
+        }
+        if is_stale {
+            self.pairs.rebuild(self.problem, &mut self.spacing, &self.positions, work);
+        } else {
+            let (problem, positions) = (self.problem, &self.positions);
+            self.pairs.push(|pair| ends(problem, positions, pair));
+        }
+        work.spend(self.pairs.pairs.len());
         let barrier = self.push_apart();
-        let loss = self.ratio_loss(x) + self.placement();
-        let total = if self.met.is_empty() { loss + self.strength * barrier } else { f64::INFINITY };
-        Value { loss, total }
+        if !self.met.is_empty() {
+            return Value { loss: f64::INFINITY, total: f64::INFINITY };
+        }
+        let loss = self.loss(x);
+        Value { loss, total: loss + self.strength * barrier }
+    }
+
+    /// E at x, where the last evaluation was.
+    pub(super) fn loss(&mut self, x: &[f64]) -> f64 {
+        self.ratio_loss(x) + self.placement()
     }
 
     fn place(&mut self, x: &[f64]) {
@@ -240,17 +219,12 @@ impl<'a, S: Spacing> Field<'a, S> {
         }
     }
 
-    /// Σ b over the pairs, and the forces on their ends.
+    /// Σ b over the pairs, which have been pushed, and the forces on their ends.
     fn push_apart(&mut self) -> f64 {
-        let Self { problem, pairs, pushes, positions, force, met, .. } = self;
-        pushes.resize(pairs.pairs.len(), Push::NONE);
-        let push_of = |pair: &Pair| Push::of(pair, ends(problem, positions, pair));
-        pushes.par_iter_mut().with_min_len(PAIRS_PER_CHUNK).zip(&pairs.pairs).for_each(|(push, pair)| {
-            *push = push_of(pair);
-        });
+        let Self { problem, pairs, force, met, .. } = self;
         force.fill(DVec2::ZERO);
         let mut sum = 0.0;
-        for (push, pair) in pushes.iter().zip(&pairs.pairs) {
+        for (push, pair) in pairs.pushes.iter().zip(&pairs.pairs) {
             if push.value == 0.0 {
                 continue;
             }

@@ -144,12 +144,16 @@ impl Spacing for Clearance<'_> {
     }
 
     fn reach_mm(&self) -> f64 {
-        self.reach_mm.max(WIDEST_FLOOR * self.separation.clearance_mm)
+        self.reach_mm.max(WIDEST_FLOOR * self.floor_reach_mm())
+    }
+
+    fn floor_reach_mm(&self) -> f64 {
+        self.separation.clearance_mm.max(self.separation.tolerance_mm())
     }
 
     fn halve_reach(&mut self) -> bool {
         self.reach_mm *= 0.5;
-        self.reach_mm >= WIDEST_FLOOR * self.separation.clearance_mm && self.reach_mm > 0.0
+        self.reach_mm >= WIDEST_FLOOR * self.floor_reach_mm()
     }
 
     fn bounds(&self, a: usize, b: usize) -> Option<Bounds> {

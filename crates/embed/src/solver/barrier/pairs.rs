@@ -1,34 +1,36 @@
 //! The pairs of edges that may be near each other, kept while nothing moves far.
 //!
-//! **Input** positions, and a rule of what each pair has to keep. **Output** flat lists of pairs.
+//! **Input** positions, and a rule of what each pair has to keep. **Output** flat lists of pairs; the pairs that meet.
 //! **Notation** skin: how far a node may move before the list is made anew.
-//! **Steps** 1. Each edge, as thick as the rule says, is counted into the cells of a hashed grid, then entered:
-//! two passes, no lists to link. 2. Each edge visits the cells within its thickness, the rule's reach and twice
-//! the skin, and keeps the edges before it. 3. Entries stand in order of their parents, so that an edge steps
-//! over its siblings at once: a star of 10,000 is no worse than a chain.
+//! **Steps** 1. Edges in order of their parents, eight to a run; a box around each edge, as thick as the rule says and
+//! grown by half the rule's reach and the skin; boxes around runs, and around those two by two. 2. Pairs of boxes that
+//! meet, from the large to the small; then edges against eight edges at a time, then edge against edge. Pairs that are
+//! listed are pushed apart at once, since their nearest points are known. 3. Siblings stand next to each other, and two
+//! runs of the same siblings pass each other at once: a star of 10,000 is no worse than a chain. 4. Where edges meet no
+//! list is made: a search as wide as the floors finds which.
 //! **Guarantees** every pair within the rule's reach is listed until a node has moved by more than the skin; the
 //! order of the list depends on positions only.
-//! **Cost** O(N + cells + candidates) to make; no allocation after the arrays have grown.
-
-use std::ops::Range;
+//! Why not a grid? One with cells as wide as the reach took a third of the time of a whole embedding of an airway of 4099
+//! nodes, most of it for finding pairs several times; boxes take half of that.
+//! **Cost** O(N log N + pairs of runs that are near) to make; no allocation after the arrays have grown.
 
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::super::grid::{each_cell, mix};
 use super::super::work::Work;
-use super::contact::Contact;
+use super::contact::{Contact, Ends, Push, are_apart};
 use crate::problem::Problem;
+use crate::runs::{Box2, Lanes, MIXED, RUN, is_same_fan};
 
 /// The skin as a share of the reach. A wider one lists more pairs and is left as soon where whole subtrees turn: on an
 /// airway of 4099 nodes the first relaxing takes 575 million units of work at .35, 445 at .15, 389 at .05.
 const SKIN_SHARE: f64 = 0.05;
 /// More pairs than this for each edge are not listed: the reach is halved instead, so that memory is bounded.
 const MOST_PAIRS_PER_EDGE: usize = 60;
-/// Edges whose neighbours are looked up together.
-const EDGES_PER_CHUNK: usize = 2048;
-/// A cell is at least this share of the largest half width, or one thick edge would be in too many.
-const MOST_CELLS_ACROSS: f64 = 32.0;
+/// Runs whose neighbours are looked up together, at most: a power of two.
+const RUNS_PER_CHUNK: usize = 256;
+/// Pairs that one thread pushes at once.
+const PAIRS_PER_CHUNK: usize = 4096;
 
 /// What two edges have to keep: the barrier is infinite at `floor_mm` and ends at `floor_mm + width_mm`.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +45,8 @@ pub(crate) trait Spacing: Sync {
     fn thickness_mm(&self, edge: usize) -> f64;
     /// The most that any pair's bounds end beyond the two thicknesses, in mm.
     fn reach_mm(&self) -> f64;
+    /// The most that any pair's floor is beyond the two thicknesses, in mm.
+    fn floor_reach_mm(&self) -> f64;
     /// Halves the reach; false if it is as short as the rule allows.
     fn halve_reach(&mut self) -> bool;
     /// What edges a < b have to keep, if anything; nothing if they have a common node.
@@ -61,31 +65,42 @@ pub(super) struct Pair {
 #[derive(Default)]
 pub(super) struct PairList {
     pub(super) pairs: Vec<Pair>,
+    /// What the barrier does to each pair, at the places for which that was asked last.
+    pub(super) pushes: Vec<Push>,
     /// Where the nodes were when the list was made.
     anchors: Vec<DVec2>,
     skin_mm: f64,
-    by_parent: Vec<u32>,
-    /// Where the entries of each cell begin, and one more.
-    starts: Vec<u32>,
-    entries: Vec<u32>,
-    /// For each entry, the end of the run of siblings it is in.
-    run_ends: Vec<u32>,
+    /// Edges in order of their parents; eight at a time are a run.
+    order: Vec<u32>,
+    /// For each run the node from which all its edges come, or `MIXED`.
+    hubs: Vec<u32>,
+    lanes: Vec<Lanes>,
+    /// Boxes over runs, two by two: box b holds the boxes 2b and 2b + 1, the last ones are those of runs.
+    boxes: Vec<Box2>,
     chunks: Vec<Chunk>,
 }
 
-/// What the edges of one chunk found.
+/// What the runs of one chunk found.
 #[derive(Default)]
 struct Chunk {
     pairs: Vec<Pair>,
-    candidates: Vec<u32>,
-    n_visits: usize,
+    pushes: Vec<Push>,
+    stack: Vec<(u32, u32)>,
+    n_looked: usize,
 }
 
 impl PairList {
     pub(super) fn new(problem: &Problem) -> Self {
-        let mut by_parent: Vec<u32> = (1..problem.n_nodes() as u32).collect();
-        by_parent.sort_by_key(|&node| (problem.parent[node as usize], node));
-        Self { by_parent, ..Self::default() }
+        let mut order: Vec<u32> = (1..problem.n_nodes() as u32).collect();
+        order.sort_by_key(|&node| (problem.parent[node as usize], node));
+        let hub = |run: &[u32]| {
+            let hub = problem.parent[run[0] as usize];
+            if run.iter().all(|&edge| problem.parent[edge as usize] == hub) { hub } else { MIXED }
+        };
+        let hubs: Vec<u32> = order.chunks(RUN).map(hub).collect();
+        let lanes = vec![Lanes::EMPTY; hubs.len()];
+        let boxes = vec![Box2::EMPTY; 2 * hubs.len().next_power_of_two()];
+        Self { order, hubs, lanes, boxes, ..Self::default() }
     }
 
     #[cfg(test)]
@@ -100,7 +115,14 @@ impl PairList {
             || self.anchors.iter().zip(positions).any(|(a, p)| a.distance_squared(*p) > most)
     }
 
-    /// Makes the list for the places of now.
+    /// Pushes the listed pairs apart where they are now.
+    pub(super) fn push(&mut self, ends: impl Fn(&Pair) -> Ends + Sync) {
+        self.pushes.resize(self.pairs.len(), Push::NONE);
+        let pushes = self.pushes.par_iter_mut().with_min_len(PAIRS_PER_CHUNK);
+        pushes.zip(&self.pairs).for_each(|(push, pair)| *push = Push::between(ends(pair), &pair.bounds));
+    }
+
+    /// Makes the list for the places of now, and pushes its pairs apart there.
     pub(super) fn rebuild(
         &mut self,
         problem: &Problem,
@@ -114,10 +136,17 @@ impl PairList {
         loop {
             self.skin_mm = SKIN_SHARE * spacing.reach_mm();
             let slack_mm = 2.0 * self.skin_mm;
-            let mut search = Search { problem, spacing: &*spacing, positions, cells_per_mm: 0.0, slack_mm };
-            search.cells_per_mm = search.cells_per_mm();
-            self.enter(&search);
-            if self.collect(&search, most_pairs, work) {
+            let reach_mm = spacing.reach_mm() + slack_mm;
+            let search = Search {
+                problem,
+                spacing: &*spacing,
+                positions,
+                reach_mm,
+                wanted: Wanted::Near { slack_mm },
+            };
+            self.fit_boxes(&search);
+            if self.look(&search, most_pairs, work) {
+                self.collect();
                 return;
             }
             if !spacing.halve_reach() {
@@ -126,109 +155,131 @@ impl PairList {
         }
     }
 
-    /// Enters all edges into the cells.
-    fn enter<S: Spacing>(&mut self, search: &Search<S>) {
-        let n_lists = (2 * self.by_parent.len()).next_power_of_two().max(16);
-        let mask = n_lists - 1;
-        self.starts.clear();
-        self.starts.resize(n_lists + 1, 0);
-        for &edge in &self.by_parent {
-            search.each_cell(edge as usize, 0.0, |cell| self.starts[(mix(cell) & mask) + 1] += 1);
-        }
-        for list in 0..n_lists {
-            self.starts[list + 1] += self.starts[list];
-        }
-        let n_entries = self.starts[n_lists] as usize;
-        self.entries.clear();
-        self.entries.resize(n_entries, 0);
-        for &edge in &self.by_parent {
-            search.each_cell(edge as usize, 0.0, |cell| {
-                let start = &mut self.starts[mix(cell) & mask];
-                self.entries[*start as usize] = edge;
-                *start += 1;
-            });
-        }
-        // Each start has moved to its end, which is the start of the next.
-        self.starts.copy_within(0..n_lists, 1);
-        self.starts[0] = 0;
-        self.find_runs(search.problem, n_lists);
+    /// Pairs of edges that are not above their floors, all of them unless they are very many; the list stays.
+    pub(super) fn find_met(
+        &mut self,
+        (problem, spacing, positions): (&Problem, &impl Spacing, &[DVec2]),
+        met: &mut Vec<(u32, u32)>,
+        work: &mut Work,
+    ) {
+        let reach_mm = spacing.floor_reach_mm() * (1.0 + 1e-9);
+        let search = Search { problem, spacing, positions, reach_mm, wanted: Wanted::Met };
+        self.fit_boxes(&search);
+        self.look(&search, MOST_PAIRS_PER_EDGE * problem.n_nodes(), work);
+        met.extend(self.chunks.iter().flat_map(|chunk| &chunk.pairs).map(|pair| (pair.first, pair.second)));
     }
 
-    fn find_runs(&mut self, problem: &Problem, n_lists: usize) {
-        self.run_ends.clear();
-        self.run_ends.resize(self.entries.len(), 0);
-        for list in 0..n_lists {
-            let (start, end) = (self.starts[list] as usize, self.starts[list + 1] as usize);
-            let mut run_end = end as u32;
-            for idx in (start..end).rev() {
-                let parent = problem.parent[self.entries[idx] as usize];
-                if idx + 1 < end && problem.parent[self.entries[idx + 1] as usize] != parent {
-                    run_end = idx as u32 + 1;
+    /// Boxes of edges, runs and all above them.
+    fn fit_boxes<S: Spacing>(&mut self, search: &Search<S>) {
+        let first_leaf = self.boxes.len() / 2;
+        for (run, edges) in self.order.chunks(RUN).enumerate() {
+            let mut all = Box2::EMPTY;
+            for (lane, &edge) in edges.iter().enumerate() {
+                let bounds = search.bounds_of(edge as usize);
+                self.lanes[run].set(lane, bounds);
+                all = all.joined(&bounds);
+            }
+            self.boxes[first_leaf + run] = all;
+        }
+        for idx in (1..first_leaf).rev() {
+            self.boxes[idx] = self.boxes[2 * idx].joined(&self.boxes[2 * idx + 1]);
+        }
+    }
+
+    /// Finds the pairs, chunk by chunk; false if there are more than `most_pairs`.
+    fn look<S: Spacing>(&mut self, search: &Search<S>, most_pairs: usize, work: &mut Work) -> bool {
+        let Self { chunks, order, hubs, lanes, boxes, .. } = self;
+        let runs = Runs { order, hubs, lanes, boxes };
+        // A chunk is what one box at some height holds.
+        let (n_leaves, n_chunks) = (boxes.len() / 2, (boxes.len() / 2).div_ceil(RUNS_PER_CHUNK));
+        chunks.resize_with(n_chunks.min(hubs.len().div_ceil(n_leaves / n_chunks)), Chunk::default);
+        chunks.par_iter_mut().enumerate().for_each(|(idx, chunk)| {
+            chunk.collect(search, &runs, (n_chunks + idx, 2 * n_chunks, most_pairs));
+        });
+        work.spend(search.positions.len() + chunks.iter().map(|chunk| chunk.n_looked).sum::<usize>());
+        chunks.iter().map(|chunk| chunk.pairs.len()).sum::<usize>() <= most_pairs
+    }
+
+    /// Makes the list of what was found.
+    fn collect(&mut self) {
+        self.pairs.clear();
+        self.pushes.clear();
+        for chunk in &self.chunks {
+            self.pairs.extend_from_slice(&chunk.pairs);
+            self.pushes.extend_from_slice(&chunk.pushes);
+        }
+    }
+}
+
+/// The boxes as they are read.
+struct Runs<'a> {
+    order: &'a [u32],
+    hubs: &'a [u32],
+    lanes: &'a [Lanes],
+    boxes: &'a [Box2],
+}
+
+impl Chunk {
+    /// The pairs of what is in one box, with itself and with the boxes after it at the same height.
+    fn collect<S: Spacing>(
+        &mut self,
+        search: &Search<S>,
+        runs: &Runs,
+        (own, end, most_pairs): (usize, usize, usize),
+    ) {
+        self.pairs.clear();
+        self.pushes.clear();
+        self.n_looked = 0;
+        for later in own..end {
+            self.stack.push((own as u32, later as u32));
+            while let Some((a, b)) = self.stack.pop() {
+                self.n_looked += 1;
+                if self.pairs.len() <= most_pairs {
+                    self.open(search, runs, (a as usize, b as usize));
                 }
-                self.run_ends[idx] = run_end;
             }
         }
     }
 
-    /// Lists the pairs; false if there are more than `most_pairs`.
-    fn collect<S: Spacing>(&mut self, search: &Search<S>, most_pairs: usize, work: &mut Work) -> bool {
-        let n_nodes = search.problem.n_nodes();
-        let margin_mm = search.spacing.reach_mm() + 2.0 * self.skin_mm;
-        let Self { pairs, chunks, starts, entries, run_ends, .. } = self;
-        let cells = Cells { starts, entries, run_ends };
-        chunks.resize_with(n_nodes.div_ceil(EDGES_PER_CHUNK), Chunk::default);
-        chunks.par_iter_mut().enumerate().for_each(|(idx, chunk)| {
-            let edges = (idx * EDGES_PER_CHUNK).max(1)..((idx + 1) * EDGES_PER_CHUNK).min(n_nodes);
-            chunk.collect(search, &cells, (edges, margin_mm, most_pairs));
-        });
-        work.spend(n_nodes + chunks.iter().map(|chunk| chunk.n_visits).sum::<usize>());
-        pairs.clear();
-        chunks.iter().for_each(|chunk| pairs.extend_from_slice(&chunk.pairs));
-        pairs.len() <= most_pairs
+    /// Looks into two boxes of one height, or into one, if they meet.
+    fn open<S: Spacing>(&mut self, search: &Search<S>, runs: &Runs, (a, b): (usize, usize)) {
+        let first_leaf = runs.boxes.len() / 2;
+        if !runs.boxes[a].meets(&runs.boxes[b]) {
+            return;
+        }
+        if a >= first_leaf {
+            self.pair_runs(search, runs, (a - first_leaf, b - first_leaf));
+            return;
+        }
+        let (low, high, other_low, other_high) =
+            (2 * a as u32, 2 * a as u32 + 1, 2 * b as u32, 2 * b as u32 + 1);
+        self.stack.extend([(high, other_high), (low, other_high), (low, other_low)]);
+        if a != b {
+            self.stack.push((high, other_low));
+        }
     }
-}
 
-/// The grid as it is read.
-struct Cells<'a> {
-    starts: &'a [u32],
-    entries: &'a [u32],
-    run_ends: &'a [u32],
-}
-
-impl Chunk {
-    fn collect<S: Spacing>(
-        &mut self,
-        search: &Search<S>,
-        cells: &Cells,
-        (edges, margin_mm, most_pairs): (Range<usize>, f64, usize),
-    ) {
-        let mask = cells.starts.len() - 2;
-        self.pairs.clear();
-        self.n_visits = 0;
-        for edge in edges {
-            let parent = search.problem.parent[edge];
-            self.candidates.clear();
-            search.each_cell(edge, margin_mm, |cell| {
-                let list = mix(cell) & mask;
-                let (mut idx, end) = (cells.starts[list] as usize, cells.starts[list + 1] as usize);
-                while idx < end {
-                    self.n_visits += 1;
-                    let other = cells.entries[idx];
-                    if search.problem.parent[other as usize] == parent {
-                        idx = cells.run_ends[idx] as usize;
-                        continue;
-                    }
-                    idx += 1;
-                    if (other as usize) < edge && other != parent {
-                        self.candidates.push(other);
-                    }
+    fn pair_runs<S: Spacing>(&mut self, search: &Search<S>, runs: &Runs, (run, later): (usize, usize)) {
+        if is_same_fan(runs.hubs[run], runs.hubs[later]) {
+            return;
+        }
+        let (lanes, later_lanes) = (&runs.lanes[run], &runs.lanes[later]);
+        let mut reaching = lanes.meeting(runs.boxes[runs.boxes.len() / 2 + later]);
+        while reaching != 0 {
+            let lane = reaching.trailing_zeros() as usize;
+            reaching &= reaching - 1;
+            // Within a run only lanes after this one.
+            let after = if run == later { !1 << lane } else { u32::MAX };
+            let mut met = later_lanes.meeting(lanes.get(lane)) & after;
+            self.n_looked += 1;
+            while met != 0 {
+                let other = later * RUN + met.trailing_zeros() as usize;
+                met &= met - 1;
+                self.n_looked += 1;
+                if let Some((pair, contact)) = search.pair(runs.order[run * RUN + lane], runs.order[other]) {
+                    self.pairs.push(pair);
+                    self.pushes.push(Push::of(&contact, &pair.bounds));
                 }
-            });
-            self.candidates.sort_unstable();
-            self.candidates.dedup();
-            self.pairs.extend(self.candidates.iter().filter_map(|&other| search.pair(other as usize, edge)));
-            if self.pairs.len() > most_pairs {
-                return;
             }
         }
     }
@@ -239,58 +290,56 @@ struct Search<'a, S> {
     problem: &'a Problem<'a>,
     spacing: &'a S,
     positions: &'a [DVec2],
-    cells_per_mm: f64,
-    /// By how much a pair can come nearer while the list holds.
-    slack_mm: f64,
+    /// Pairs farther apart than this beyond their thicknesses are of no interest.
+    reach_mm: f64,
+    wanted: Wanted,
+}
+
+/// Which pairs a search is for.
+#[derive(Clone, Copy)]
+enum Wanted {
+    /// Those that come within their bounds if they come nearer by this.
+    Near { slack_mm: f64 },
+    /// Those that are not above their floors.
+    Met,
 }
 
 impl<S: Spacing> Search<'_, S> {
-    /// Cells about as large as an edge is long or as a search is wide, whichever is more, so that there are
-    /// few cells for each edge.
-    fn cells_per_mm(&self) -> f64 {
-        let n_edges = self.positions.len().max(2) - 1;
-        let extent = |edge: usize| {
-            self.ends(edge).0.distance(self.ends(edge).1) + 2.0 * self.spacing.thickness_mm(edge)
-        };
-        let mean_mm = (1..self.positions.len()).map(extent).sum::<f64>() / n_edges as f64;
-        let thickest_mm = (1..self.positions.len()).map(|e| self.spacing.thickness_mm(e)).fold(0.0, f64::max);
-        let cell_mm =
-            mean_mm.max(self.spacing.reach_mm() + self.slack_mm).max(thickest_mm / MOST_CELLS_ACROSS);
-        1.0 / cell_mm.max(f64::MIN_POSITIVE)
-    }
-
     fn ends(&self, edge: usize) -> (DVec2, DVec2) {
         (self.positions[self.problem.parent[edge] as usize], self.positions[edge])
     }
 
-    fn each_cell(&self, edge: usize, margin_mm: f64, mut visit: impl FnMut((i32, i32))) {
+    /// A box such that boxes of edges meet that are within reach.
+    fn bounds_of(&self, edge: usize) -> Box2 {
+        let per_mm = 1.0 / self.problem.scale_mm;
+        let margin_mm = self.spacing.thickness_mm(edge) + 0.5 * self.reach_mm;
         let (a, b) = self.ends(edge);
-        let margin = (self.spacing.thickness_mm(edge) + margin_mm) * self.cells_per_mm + 1e-9;
-        each_cell(a * self.cells_per_mm, b * self.cells_per_mm, margin, |cell| {
-            visit(cell);
-            true
-        });
+        let (a, b) = (a * per_mm, b * per_mm);
+        Box2::around((a.x, a.y), (b.x, b.y), margin_mm * per_mm)
     }
 
-    /// The pair, if it can come within its bounds while the list holds.
-    fn pair(&self, first: usize, second: usize) -> Option<Pair> {
-        let (p, q) = (self.ends(first), self.ends(second));
-        let thick_mm = self.spacing.thickness_mm(first) + self.spacing.thickness_mm(second);
-        if are_apart(p, q, thick_mm + self.spacing.reach_mm() + self.slack_mm) {
+    /// The pair of two edges, if it is wanted.
+    fn pair(&self, edge: u32, other: u32) -> Option<(Pair, Contact)> {
+        let (first, second) = (edge.min(other), edge.max(other));
+        let (a, b) = (first as usize, second as usize);
+        let parent = self.problem.parent[b];
+        if parent == first || parent == self.problem.parent[a] {
             return None;
         }
-        let bounds = self.spacing.bounds(first, second)?;
-        let reach_mm = bounds.floor_mm + bounds.width_mm + self.slack_mm;
-        let is_near = Contact::between(p, q).distance < reach_mm;
-        is_near.then_some(Pair { first: first as u32, second: second as u32, bounds })
+        let (p, q) = (self.ends(a), self.ends(b));
+        let thick_mm = self.spacing.thickness_mm(a) + self.spacing.thickness_mm(b);
+        if are_apart(p, q, thick_mm + self.reach_mm) {
+            return None;
+        }
+        let contact = Contact::between(p, q);
+        if contact.distance >= thick_mm + self.reach_mm {
+            return None;
+        }
+        let bounds = self.spacing.bounds(a, b)?;
+        let is_wanted = match self.wanted {
+            Wanted::Near { slack_mm } => contact.distance < bounds.floor_mm + bounds.width_mm + slack_mm,
+            Wanted::Met => contact.distance <= bounds.floor_mm,
+        };
+        is_wanted.then_some((Pair { first, second, bounds }, contact))
     }
-}
-
-/// Whether two segments are farther apart than `reach` for sure: the discs about them are.
-pub(super) fn are_apart((p0, p1): (DVec2, DVec2), (q0, q1): (DVec2, DVec2), reach: f64) -> bool {
-    let between = 0.5 * ((p0 + p1) - (q0 + q1));
-    let (p, q) = ((p1 - p0).length_squared(), (q1 - q0).length_squared());
-    // (a + b)² ≤ 2 (a² + b²) spares the roots: half lengths are √p / 2 and √q / 2.
-    let halves = (0.5 * (p + q)).sqrt();
-    between.length_squared() > (halves + reach) * (halves + reach)
 }

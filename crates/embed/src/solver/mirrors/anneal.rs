@@ -14,9 +14,9 @@ use super::state::{Prices, Saved, State, Step, Terms};
 
 /// The temperature is set anew after this many evaluations.
 const STRIDE: u64 = 64;
-/// An evaluation may look at this many pairs of blocks on average; then the phase runs through faster. Trees of 100
-/// to 5000 nodes take 100 to 300.
-const VISITS_PER_EVALUATION: f64 = 600.0;
+/// An evaluation may look at this many pairs of blocks on average; then the phase runs through faster. An airway of 4099
+/// nodes that cannot be freed took 12 s of walks at 600 for 36 crossings and ends with 35 after 7 s.
+const VISITS_PER_EVALUATION: f64 = 300.0;
 
 /// What a phase does.
 #[derive(Clone, Copy, Debug)]

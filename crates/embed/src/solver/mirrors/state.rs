@@ -29,6 +29,11 @@ const RAY_LENGTH: f64 = 1.5;
 /// A layout is built anew from its turns after this many steps, so that rounding does not add up.
 const STEPS_UNTIL_REBUILT: u32 = 4096;
 
+/// How many pairs that were in the way are kept for each node.
+const N_RECENT: usize = 4;
+/// No pair.
+const NO_PAIR: [u32; 2] = [0; 2];
+
 /// A part of the tree and where it goes.
 #[derive(Clone, Debug)]
 pub(super) struct Part {
@@ -153,6 +158,8 @@ pub(super) struct State<'s> {
     /// Of the last evaluation: conflicts that go, by index, and conflicts that come.
     going: Vec<usize>,
     coming: Vec<Conflict>,
+    /// For the first node of a step, pairs of edges that made such steps too dear lately.
+    recent: Vec<[[u32; 2]; N_RECENT]>,
     /// Memory for the ranges of two parts.
     ranges: [Vec<Range<usize>>; 2],
 }
@@ -176,6 +183,7 @@ impl<'s> State<'s> {
             walk: Walk::default(),
             going: Vec::new(),
             coming: Vec::new(),
+            recent: vec![[NO_PAIR; N_RECENT]; setting.n_nodes()],
             ranges: [Vec::new(), Vec::new()],
         };
         state.rebuild();
@@ -263,7 +271,56 @@ impl<'s> State<'s> {
         self.find_going(step);
         let list = self.conflicts.list();
         change -= self.going.iter().map(|&pair_idx| prices.of(list[pair_idx].fault)).sum::<f64>();
-        if change > limit { None } else { self.find_coming(step, prices, (change, limit)) }
+        if change > limit || self.is_barred(step, prices, (change, limit)) {
+            return None;
+        }
+        let found = self.find_coming(step, prices, (change, limit));
+        if found.is_none() {
+            self.remember(step);
+        }
+        found
+    }
+
+    /// Whether pairs that were in the way of such steps lately make this one too dear already.
+    fn is_barred(&mut self, step: &Step, prices: &Prices, (mut change, limit): (f64, f64)) -> bool {
+        let recent = self.recent[step.parts[0].range.start];
+        for pair in recent.into_iter().take_while(|pair| *pair != NO_PAIR) {
+            let [a, b] = pair.map(|edge| edge as usize);
+            let (part_a, part_b) = (step.part_of(a), step.part_of(b));
+            if part_a == part_b {
+                continue;
+            }
+            self.walk.n_visits += 1;
+            let fault =
+                self.setting.fault((a, self.moved(step, (a, part_a))), (b, self.moved(step, (b, part_b))));
+            change += fault.map_or(0.0, |fault| prices.of(fault));
+            if change > limit {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// An edge after a step.
+    fn moved(&self, step: &Step, (edge, part): (usize, usize)) -> Segment {
+        let (a, b) = self.hierarchy.ends[edge];
+        match part {
+            0 => Segment { a, b },
+            part => {
+                let isometry = &step.parts[part - 1].isometry;
+                Segment { a: isometry.point(a), b: isometry.point(b) }
+            }
+        }
+    }
+
+    /// Keeps the pair that made a step too dear, in place of the oldest.
+    fn remember(&mut self, step: &Step) {
+        let Some(Conflict { edges, .. }) = self.coming.last() else { return };
+        let recent = &mut self.recent[step.parts[0].range.start];
+        if !recent.contains(edges) {
+            recent.rotate_right(1);
+            recent[0] = *edges;
+        }
     }
 
     /// Conflicts between different parts.
