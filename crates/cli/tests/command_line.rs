@@ -285,6 +285,60 @@ fn verify_prints_a_table_and_fails_where_a_claim_does() {
     refused(&folder, &["verify", "nowhere"], 74, &["SHA256SUMS"]);
 }
 
+/// The baseline of a view that a file says: of a `views.json`, of two vectors, of nothing that is one.
+#[test]
+fn view_of_marino_from_a_file() {
+    let swc =
+        "1 1 0 0 0 1 -1\n2 3 0 10 0 1 1\n3 3 -3 18 4 1 2\n4 3 -7 26 0 1 3\n5 3 3 18 2 1 2\n6 3 7 26 9 1 5\n";
+    let folder = folder_with("fork.swc", swc.as_bytes());
+    let config = "schema = 1\nname = \"fork\"\n[input]\npath = \"fork.swc\"\n[embed]\nmethod = \"marino\"\nmethods = []\n[render]\nwidth_px = 300\n";
+    fs::write(folder.path().join("fork.toml"), config).expect("config");
+    let run = |out: &str, sets: &[&str]| {
+        let sets = sets.iter().flat_map(|set| ["--set", set]);
+        let arguments: Vec<&str> = ["run", "fork.toml", "-o", out].into_iter().chain(sets).collect();
+        let output = espalier(folder.path(), &arguments);
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
+    };
+    let read = |file: &str| fs::read_to_string(folder.path().join(file)).expect("file");
+    let positions = |out: &str| {
+        let embedding: serde_json::Value =
+            serde_json::from_str(&read(&format!("{out}/embedding.json"))).expect("JSON");
+        embedding["positions_mm"].clone()
+    };
+    run("auto", &[]);
+    run("axial", &["embed.marino.view=axial"]);
+    // Its own global view again, and that from the feet.
+    run("same", &["embed.marino.view=file", "embed.marino.view_file=auto/views.json"]);
+    assert_eq!(positions("same"), positions("auto"));
+    fs::write(folder.path().join("feet.json"), r#"{ "towards_camera": [0, 0, -2], "up": [0, 1, 0] }"#)
+        .expect("view");
+    run("feet", &["embed.marino.view=file", "embed.marino.view_file=feet.json"]);
+    assert_eq!(positions("feet"), positions("axial"));
+    assert_ne!(positions("feet"), positions("auto"));
+    assert!(read("feet/provenance/inputs.tsv").contains("\nmarino_view\t"));
+    assert!(read("feet/compare.tsv").contains("\nmarino file\t"));
+    let again = espalier(folder.path(), &["embed", "feet"]);
+    assert_eq!(again.status.code(), Some(0), "{}", stderr(&again));
+
+    let refuse = |sets: &[&str], code: i32, fragments: &[&str]| {
+        let sets = sets.iter().flat_map(|set| ["--set", set]);
+        let arguments: Vec<&str> = ["run", "fork.toml", "-o", "feet"].into_iter().chain(sets).collect();
+        refused(&folder, &arguments, code, fragments);
+    };
+    let file = "embed.marino.view=file";
+    refuse(&[file], 2, &["marino.view_file", "needs the name of one"]);
+    refuse(&["embed.marino.view_file=feet.json"], 2, &["marino.view_file", "only"]);
+    refuse(&[file, "embed.marino.view_file=nowhere.json"], 74, &["nowhere.json"]);
+    refuse(&[file, "embed.marino.view_file=fork.swc"], 3, &["fork.swc", "towards_camera"]);
+    fs::write(folder.path().join("flat.json"), r#"{ "towards_camera": [0, 0, -2], "up": [0, 0, 1] }"#)
+        .expect("view");
+    refuse(
+        &[file, "embed.marino.view_file=flat.json"],
+        3,
+        &["flat.json", "up is along towards_camera", "hint"],
+    );
+}
+
 /// A neuron of a stem and two branches, its run, and edits of it.
 #[test]
 fn manual_edits() {

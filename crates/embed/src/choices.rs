@@ -144,6 +144,8 @@ pub enum MarinoView {
     Axial,
     /// From `towards_camera`, with `up` upwards.
     Towards,
+    /// The same, as `view_file` has them.
+    File,
 }
 
 impl MarinoView {
@@ -156,6 +158,7 @@ impl MarinoView {
             Self::Sagittal => "sagittal",
             Self::Axial => "axial",
             Self::Towards => "towards",
+            Self::File => "file",
         }
     }
 }

@@ -70,5 +70,5 @@ pub use skeleton::Skeleton;
 pub use spheres::{InscribedSpheres, SPHERE_COLUMNS, Sphere};
 pub use tree::{Branch, Branches, Node, Tree, TreeError};
 pub use versioned::FileError;
-pub use views::{LocalPlane, SubtreeView, View, ViewHierarchy};
+pub use views::{LocalPlane, SubtreeView, View, ViewHierarchy, view_axes_from_json};
 pub use volume::{Volume, Voxels};

@@ -75,6 +75,11 @@ impl Diagnose for FileError {
             {
                 "pipelines/README.md shows such a file; nodes.tsv has the numbers of branches and nodes"
             }
+            Self::Malformed { format, .. } | Self::Invalid { format, .. }
+                if *format == crate::views::VIEW_FORMAT =>
+            {
+                "take a views.json, or write { \"towards_camera\": [0, 1, 0], \"up\": [0, 0, 1] } with two vectors in RAS+"
+            }
             _ => "write the file again with this version of espalier: run the stage that makes it",
         }
         .to_owned()

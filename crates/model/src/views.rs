@@ -132,6 +132,50 @@ impl ViewHierarchy {
     }
 }
 
+/// The two vectors of a view that a file gives: of the global view of a `views.json`, of whatever tree, or of JSON with
+/// nothing but `towards_camera` and `up`, RAS+, of any length.
+///
+/// # Errors
+/// [`FileError`] if the text is neither, or of another version, or if the vectors make no view.
+pub fn view_axes_from_json(text: &str) -> Result<(DVec3, DVec3), FileError> {
+    let has_format = serde_json::from_str::<NamedFormat>(text).is_ok_and(|named| named.format.is_some());
+    let axes: ViewAxes = if has_format {
+        let file: ViewsFile = versioned::from_json(FORMAT, VERSION, text)?;
+        ViewAxes { towards_camera: file.global.towards_camera, up: file.global.up }
+    } else {
+        serde_json::from_str(text).map_err(|source| FileError::Malformed { format: VIEW_FORMAT, source })?
+    };
+    let vectors = [axes.towards_camera, axes.up].map(DVec3::from_array);
+    for (name, vector) in ["towards_camera", "up"].into_iter().zip(vectors) {
+        let is_vector = (1e-100..=1e100).contains(&vector.length());
+        let what =
+            || FileError::Invalid { format: VIEW_FORMAT, what: format!("{name} has no direction: {vector}") };
+        is_vector.then_some(()).ok_or_else(what)?;
+    }
+    let [towards_camera, up] = vectors.map(DVec3::normalize);
+    if towards_camera.cross(up).length() <= 1e-6 {
+        let what = "up is along towards_camera".to_owned();
+        return Err(FileError::Invalid { format: VIEW_FORMAT, what });
+    }
+    Ok((towards_camera, (up - up.dot(towards_camera) * towards_camera).normalize()))
+}
+
+/// Whether a file says what it is.
+#[derive(Deserialize)]
+struct NamedFormat {
+    format: Option<serde_json::Value>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ViewAxes {
+    towards_camera: [f64; 3],
+    up: [f64; 3],
+}
+
+/// What a file of two vectors is called in messages.
+pub(crate) const VIEW_FORMAT: &str = "view";
+
 const FORMAT: &str = "espalier-views";
 const VERSION: u32 = 1;
 const SPACE: &str = "RAS+ mm";
@@ -293,6 +337,35 @@ mod tests {
             node(2.0, -1.0, Some(1)),
         ])
         .expect("a tree")
+    }
+
+    #[test]
+    fn the_axes_of_a_view_come_from_either_file() {
+        let of_hierarchy = view_axes_from_json(&sample().to_json()).expect("a view");
+        assert!(of_hierarchy.0.distance(DVec3::new(0.6, 0.8, 0.0)) < 1e-15 && of_hierarchy.1 == DVec3::Z);
+        let slanted =
+            view_axes_from_json(r#"{"towards_camera": [0, 3, 0], "up": [0, 1, 2]}"#).expect("a view");
+        assert!(slanted.0 == DVec3::Y && slanted.1.distance(DVec3::Z) < 1e-15, "{slanted:?}");
+    }
+
+    #[test]
+    fn what_is_no_view_is_refused() {
+        for (text, says) in [
+            ("", "not a readable view file"),
+            ("[]", "not a readable view file"),
+            (r#"{"towards_camera": [0, 1, 0]}"#, "missing field `up`"),
+            (r#"{"towards_camera": [0, 1], "up": [0, 0, 1]}"#, "not a readable view file"),
+            (r#"{"towards_camera": [0, 1, 0], "up": [0, 0, 1], "fov": 3}"#, "unknown field `fov`"),
+            (r#"{"towards_camera": [0, 1e999, 0], "up": [0, 0, 1]}"#, "not a readable view file"),
+            (r#"{"towards_camera": [0, 0, 0], "up": [0, 0, 1]}"#, "towards_camera has no direction"),
+            (r#"{"towards_camera": [1e200, 0, 0], "up": [0, 0, 1]}"#, "towards_camera has no direction"),
+            (r#"{"towards_camera": [0, 0, 2], "up": [0, 0, -1]}"#, "up is along towards_camera"),
+            (r#"{"format": "espalier-edits", "version": 1}"#, "format espalier-edits version 1"),
+            (r#"{"format": "espalier-views", "version": 99}"#, "version 99"),
+        ] {
+            let error = view_axes_from_json(text).expect_err(text).to_string();
+            assert!(error.contains(says), "{text}: {error}");
+        }
     }
 
     fn sample() -> ViewHierarchy {

@@ -9,11 +9,12 @@ use std::sync::Arc;
 use espalier_model::swc::{self, Traced};
 use espalier_model::{
     Comparison, Diagnose, Edits, Embedding, InscribedSpheres, Ledger, Mask, Report, Skeleton, Tree,
-    ViewHierarchy, Volume,
+    ViewHierarchy, Volume, view_axes_from_json,
 };
 use espalier_model::{label_table, polydata};
 use espalier_tree::LabelMap;
 use espalier_volume::Orientation;
+use glam::DVec3;
 
 use crate::config::{Input, Unit};
 use crate::error::Error;
@@ -218,6 +219,12 @@ impl Artifacts {
     pub(crate) fn edits(&self, tree: &Tree) -> Result<Edits, Error> {
         let Some(path) = self.side_paths.get(&SideFile::Edits) else { return Ok(Edits::none(tree)) };
         Edits::from_json(&self.read_text(path)?, tree).map_err(|error| Error::file(path, error))
+    }
+
+    /// The axes of the baseline's view, towards the camera and up; none if the config names no file of them.
+    pub(crate) fn marino_axes(&self) -> Result<Option<(DVec3, DVec3)>, Error> {
+        let Some(path) = self.side_paths.get(&SideFile::MarinoView) else { return Ok(None) };
+        view_axes_from_json(&self.read_text(path)?).map(Some).map_err(|error| Error::file(path, error))
     }
 
     /// The label map that branches are labelled by; none if the config names no file of one.

@@ -14,11 +14,14 @@ pub enum SideFile {
     LabelNames,
     /// `embed.edits`: manual edits.
     Edits,
+    /// `embed.marino.view_file`: the view of the baseline.
+    MarinoView,
 }
 
 impl SideFile {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::InputLabels, Self::Labels, Self::LabelNames, Self::Edits];
+    pub const ALL: [Self; 5] =
+        [Self::InputLabels, Self::Labels, Self::LabelNames, Self::Edits, Self::MarinoView];
 
     /// The name in provenance.
     pub(crate) fn role(self) -> &'static str {
@@ -27,6 +30,7 @@ impl SideFile {
             Self::Labels => "labels",
             Self::LabelNames => "label_names",
             Self::Edits => "edits",
+            Self::MarinoView => "marino_view",
         }
     }
 
@@ -38,6 +42,7 @@ impl SideFile {
             Self::Labels => "tree.labels",
             Self::LabelNames => "tree.label_names",
             Self::Edits => "embed.edits",
+            Self::MarinoView => "embed.marino.view_file",
         }
     }
 
@@ -46,7 +51,7 @@ impl SideFile {
         match self {
             Self::InputLabels => Stage::Volume,
             Self::Labels | Self::LabelNames => Stage::Tree,
-            Self::Edits => Stage::Embed,
+            Self::Edits | Self::MarinoView => Stage::Embed,
         }
     }
 
@@ -58,6 +63,7 @@ impl SideFile {
             Self::Labels => &mut config.tree.labels,
             Self::LabelNames => &mut config.tree.label_names,
             Self::Edits => &mut config.embed.edits,
+            Self::MarinoView => &mut config.embed.marino.view_file,
         }
     }
 
@@ -68,6 +74,7 @@ impl SideFile {
             Self::Labels => &config.tree.labels,
             Self::LabelNames => &config.tree.label_names,
             Self::Edits => &config.embed.edits,
+            Self::MarinoView => &config.embed.marino.view_file,
         };
         path.as_deref().filter(|path| !path.is_empty())
     }

@@ -248,6 +248,9 @@ fn embed(step: &mut Step<'_>) -> Result<Outcome, Error> {
     if params.pose == PoseMode::Auto {
         params.pose = if step.artifacts.is_of_scan { PoseMode::View } else { PoseMode::RootOnTop };
     }
+    if let Some((towards_camera, up)) = step.artifacts.marino_axes()? {
+        (params.marino.towards_camera, params.marino.up) = (towards_camera.to_array(), up.to_array());
+    }
     let edits = step.artifacts.edits(&tree)?;
     let (seed, watch) = (step.config.seed, MethodWatch::new(step.stage, step.events));
     let hear = |event| watch.hear(event);

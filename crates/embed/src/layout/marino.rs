@@ -70,7 +70,7 @@ fn view(views: &ViewHierarchy, params: &MarinoParams) -> View {
         MarinoView::Coronal => (DVec3::Y, DVec3::Z),
         MarinoView::Sagittal => (DVec3::NEG_X, DVec3::Z),
         MarinoView::Axial => (DVec3::NEG_Z, DVec3::Y),
-        MarinoView::Towards => params.axes(),
+        MarinoView::Towards | MarinoView::File => params.axes(),
     };
     View { towards_camera, up, ..views.global }
 }
@@ -251,7 +251,7 @@ mod tests {
             (&axial, [0.0, 0.0, -1.0], [0.0, 3.0, 0.0]),
             (&auto, [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]),
         ] {
-            let same = MarinoParams { view: MarinoView::Towards, towards_camera, up };
+            let same = MarinoParams { view: MarinoView::Towards, towards_camera, up, view_file: None };
             // The vectors are brought to unit length, so the last bits may differ.
             let positions = laid_out(&tree, &same).positions;
             assert!(positions.iter().zip(&view.positions).all(|(a, b)| a.distance(*b) < 1e-9));

@@ -17,11 +17,16 @@ pub struct MarinoParams {
     /// What is up in the picture of `view = "towards"`, RAS+, of any length; its part across `towards_camera`
     /// counts. Default [0, 0, 1], cranial.
     pub up: [f64; 3],
+    /// The file of `view = "file"`, relative to the config's folder: a `views.json`, whose global view is taken, or JSON
+    /// with `towards_camera` and `up` alone. Whoever reads it puts what it says into the two vectors. Default none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub view_file: Option<String>,
 }
 
 impl Default for MarinoParams {
     fn default() -> Self {
-        Self { view: MarinoView::Auto, towards_camera: [0.0, 1.0, 0.0], up: [0.0, 0.0, 1.0] }
+        let (towards_camera, up) = ([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]);
+        Self { view: MarinoView::Auto, towards_camera, up, view_file: None }
     }
 }
 
@@ -33,13 +38,20 @@ impl MarinoParams {
         (towards_camera, (up - up.dot(towards_camera) * towards_camera).normalize_or_zero())
     }
 
-    /// Checks that the vectors make a view.
+    /// Checks that the vectors make a view, and that a file is named where one is read.
     ///
     /// # Errors
-    /// The first vector that has no direction, or has that of the other.
+    /// The first vector that has no direction, or has that of the other; a file without its view, or a view without its
+    /// file.
     pub fn validate(&self) -> Result<(), ParamError> {
         let is_vector = |v: [f64; 3]| (1e-100..=1e100).contains(&DVec3::from(v).length());
-        let Self { towards_camera, up, .. } = *self;
+        let (towards_camera, up) = (self.towards_camera, self.up);
+        let has_file = self.view_file.as_ref().is_some_and(|path| !path.is_empty());
+        let is_file = self.view == MarinoView::File;
+        let message = "view = \"file\" needs the name of one";
+        ParamError::check("marino.view_file", has_file || !is_file, message)?;
+        let message = "is read with view = \"file\" only";
+        ParamError::check("marino.view_file", is_file || !has_file, message)?;
         let message = format!("must be a vector with a length, is {towards_camera:?}");
         ParamError::check("marino.towards_camera", is_vector(towards_camera), message)?;
         let message = format!("must be a vector with a length, is {up:?}");
