@@ -7,6 +7,7 @@
 use std::error::Error;
 
 use espalier_embed::{Freedom, Method, Params, PsoParams, SolverParams};
+use espalier_model::{Tree, ViewHierarchy};
 use espalier_phantom::{Kind, grow_tree};
 
 use crate::measure::{Measured, measure, short, views};
@@ -19,9 +20,9 @@ const SEEDS: std::ops::Range<u64> = 0..5;
 /// Prints the table.
 pub(crate) fn print(options: &Options) -> Result<bool, Box<dyn Error>> {
     println!(
-        "tree | N | targets | solver E | solver s | swarm | swarm E after the solver's s | ratio | swarm E at its end | swarm s | ratio"
+        "tree | N | targets | solver E | solver s | swarm | swarm E after the solver's s | ratio | swarm E at its end | swarm s | solver E given the swarm's s | s it took | ratio"
     );
-    println!("--- | --: | --- | --: | --: | --- | --: | --: | --: | --: | --:");
+    println!("--- | --: | --- | --: | --: | --- | --: | --: | --: | --: | --: | --: | --:");
     let mut ratios = Vec::new();
     for Named { name, tree } in neurons(options)? {
         let views = views(&tree)?;
@@ -37,7 +38,13 @@ pub(crate) fn print(options: &Options) -> Result<bool, Box<dyn Error>> {
             let (Some(own), Some(swarmed)) = (solved.row("solver"), swarm.row("pso")) else { continue };
             let (solver_e, swarm_e) = (own.energy.total(), swarmed.energy.total());
             let seconds = solved.seconds_of("solver");
-            let early_e = after(&swarm, seconds);
+            let (early_e, swarm_seconds) = (after(&swarm, seconds), swarm.seconds_of("pso"));
+            let longer = given(&tree, &views, &params, swarm_seconds / seconds)?;
+            let long_e = longer
+                .as_ref()
+                .and_then(|longer| longer.row("solver"))
+                .map_or(solver_e, |row| row.energy.total());
+            let long_seconds = longer.as_ref().map_or(seconds, |longer| longer.seconds_of("solver"));
             let cells = [
                 name.clone(),
                 tree.n_nodes().to_string(),
@@ -48,11 +55,13 @@ pub(crate) fn print(options: &Options) -> Result<bool, Box<dyn Error>> {
                 short(early_e),
                 ratio(early_e, solver_e),
                 short(swarm_e),
-                format!("{:.2}", swarm.seconds_of("pso")),
-                ratio(swarm_e, solver_e),
+                format!("{swarm_seconds:.2}"),
+                short(long_e),
+                format!("{long_seconds:.2}"),
+                ratio(swarm_e, long_e),
             ];
             println!("{}", cells.join(" | "));
-            ratios.push(swarm_e.min(early_e) / solver_e);
+            ratios.push((early_e / solver_e).min(swarm_e / long_e));
         }
     }
     let n_small = ratios.iter().filter(|&&ratio| ratio < 50.0).count();
@@ -69,6 +78,23 @@ fn neurons(options: &Options) -> Result<Vec<Named>, Box<dyn Error>> {
         Ok(Named { name: format!("neuron {seed}"), tree })
     };
     SEEDS.map(grow).collect()
+}
+
+/// The solver with so many times its work, if that is more and there is something to gain; it stops where it no longer
+/// gains.
+fn given(
+    tree: &Tree,
+    views: &ViewHierarchy,
+    params: &Params,
+    times: f64,
+) -> Result<Option<Measured>, Box<dyn Error>> {
+    const MOST_EFFORT: f64 = 1000.0;
+    if times <= 1.0 {
+        return Ok(None);
+    }
+    let solver = SolverParams { effort: times.min(MOST_EFFORT), ..params.solver.clone() };
+    let params = Params { method: Method::Solver, methods: vec![], solver, ..params.clone() };
+    Ok(Some(measure(tree, views, &params)?))
 }
 
 /// The best energy of the swarm after so many of its seconds; at its start, if it took longer.

@@ -88,7 +88,7 @@ fn trees(largest: usize) -> Result<Vec<Named>, Box<dyn Error>> {
 }
 
 /// A grown airway with a node every so many mm.
-fn airway(generations: u32, min_radius_mm: f64, step_mm: f64) -> Result<Tree, Box<dyn Error>> {
+pub(crate) fn airway(generations: u32, min_radius_mm: f64, step_mm: f64) -> Result<Tree, Box<dyn Error>> {
     use espalier_model::swc;
     use espalier_tree::{Resample, from_traced};
     let clearance_mm = min_radius_mm.min(2.5);

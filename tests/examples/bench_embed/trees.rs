@@ -9,7 +9,10 @@ use espalier_model::swc::{self, SwcScale};
 use espalier_phantom::{Kind, Params, grow_tree};
 use glam::DVec3;
 
-use crate::Options;
+use crate::{Mode, Options, scale};
+
+/// The word that names an airway instead of a file: one of 4099 nodes, of which no choice of sides is free of crossings.
+const CROWDED_AIRWAY: &str = "g9";
 
 /// A tree and what to call it.
 pub(crate) struct Named {
@@ -24,9 +27,16 @@ const SCALES: [(&str, [f64; 3]); 1] = [("diadem_OP_", [0.33, 0.33, 1.0])];
 /// The trees that the options ask for, small ones first; files that are no tree are named and left out.
 pub(crate) fn trees(options: &Options) -> Result<Vec<Named>, Box<dyn Error>> {
     let mut trees = if options.paths.is_empty() { phantoms()? } else { of_files(&options.paths)? };
+    if options.paths.is_empty() && options.mode == Mode::Ablation {
+        trees.push(crowded_airway()?);
+    }
     trees.retain(|named| named.tree.n_nodes() <= options.largest);
     trees.sort_by_key(|named| named.tree.n_nodes());
     Ok(trees)
+}
+
+fn crowded_airway() -> Result<Named, Box<dyn Error>> {
+    Ok(Named { name: "airway g9".to_owned(), tree: scale::airway(9, 0.8, 2.0)? })
 }
 
 fn phantoms() -> Result<Vec<Named>, Box<dyn Error>> {
@@ -47,10 +57,12 @@ fn phantoms() -> Result<Vec<Named>, Box<dyn Error>> {
 }
 
 fn of_files(paths: &[PathBuf]) -> Result<Vec<Named>, Box<dyn Error>> {
-    let mut files = Vec::new();
+    let (mut files, mut trees) = (Vec::new(), Vec::new());
     let mut pending = paths.to_vec();
     while let Some(path) = pending.pop() {
-        if path.is_dir() {
+        if path.as_os_str() == CROWDED_AIRWAY && !path.exists() {
+            trees.push(crowded_airway()?);
+        } else if path.is_dir() {
             for entry in fs::read_dir(&path)? {
                 pending.push(entry?.path());
             }
@@ -59,7 +71,6 @@ fn of_files(paths: &[PathBuf]) -> Result<Vec<Named>, Box<dyn Error>> {
         }
     }
     files.sort();
-    let mut trees = Vec::new();
     for file in files {
         match of_file(&file) {
             Ok(tree) => trees.push(Named { name: name_of(&file), tree }),
