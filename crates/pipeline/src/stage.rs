@@ -149,6 +149,7 @@ impl Stage {
             Self::Render => &[
                 "/planar.png",
                 "/planar.svg",
+                "/planar.pdf",
                 "/planar.exr",
                 "/global-view.png",
                 "/compare.png",

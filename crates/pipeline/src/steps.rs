@@ -290,6 +290,9 @@ fn render(step: &mut Step<'_>) -> Result<Outcome, Error> {
         ("planar.svg".to_owned(), made.svg.into_bytes()),
         ("global-view.png".to_owned(), made.global_view_png),
     ];
+    if let Some(pdf) = made.pdf {
+        files.push(("planar.pdf".to_owned(), pdf));
+    }
     if let Some(exr) = made.exr {
         files.push(("planar.exr".to_owned(), exr));
     }

@@ -12,13 +12,13 @@ use glam::DVec2;
 
 use crate::drawing::{Group, Mark};
 use crate::furniture::{self, Heading};
-use crate::page::{MAX_PIXELS, Page, Pen};
+use crate::page::{MAX_PIXELS, Page};
+use crate::paint::Canvas;
 use crate::palette::{PageColors, Palette, Rgb, hex};
 use crate::params::Params;
-use crate::raster::Pixel;
 use crate::side_by_side::SideBySide;
 use crate::text::{Anchor, Face};
-use crate::{Error, paint, svg, unit};
+use crate::{Error, svg, unit};
 
 /// Charts in a row.
 const N_COLUMNS: usize = 3;
@@ -61,7 +61,7 @@ pub struct Chart {
 /// Draws charts.
 ///
 /// # Errors
-/// [`Error`] if a parameter is out of range or the figure would be over 2²⁵ pixels.
+/// [`Error`] if a parameter is out of range or the figure would be over 2²⁷ pixels.
 pub fn charts(charts: &Charts, params: &Params) -> Result<SideBySide, Error> {
     params.validate()?;
     let artist = Artist {
@@ -77,19 +77,9 @@ pub fn charts(charts: &Charts, params: &Params) -> Result<SideBySide, Error> {
     if u64::from(width) * u64::from(height) > MAX_PIXELS {
         return Err(Error::TooLarge { width, height, limit: MAX_PIXELS });
     }
-    let corner = DVec2::ZERO;
-    let page = Page {
-        width,
-        height,
-        unit_px: artist.unit,
-        px_per_mm: 1.0,
-        origin_px: corner,
-        area: [corner; 2],
-        key_at: corner,
-        pen: Pen { min_width_px: params.min_width_px, style: params.style },
-    };
-    let pixels = vec![Pixel::EMPTY; width as usize * height as usize];
-    let png = paint::png(&page, &pixels, &groups, (artist.colors.background, &artist.face))?;
+    let mut canvas = Canvas::new([width, height], artist.colors.background)?;
+    canvas.mark(&groups, &artist.face);
+    let png = canvas.png();
     Ok(SideBySide { png, svg: artist.svg(charts, &groups, [width, height]) })
 }
 
@@ -226,7 +216,7 @@ impl Artist {
              width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
              data-format=\"espalier-charts-svg\" data-version=\"1\">\n<title>{}</title>\n\
              <rect id=\"background\" width=\"{width}\" height=\"{height}\" fill=\"{}\"/>",
-            svg::escaped(&charts.title),
+            espalier_model::xml::escape(&charts.title),
             hex(self.colors.background)
         );
         svg::write_groups(&mut out, groups);

@@ -8,8 +8,10 @@ use espalier_model::{Embedding, Tree};
 
 use crate::Error;
 use crate::coloring;
+use crate::orientation::Orientation;
 use crate::palette::to_byte;
 use crate::params::Params;
+use crate::scene::Scene;
 
 /// Colours of a continuous scale: neighbours can just be told apart.
 const N_COLORS: usize = 20;
@@ -34,7 +36,8 @@ pub struct ColorTable {
 pub fn color_table(tree: &Tree, embedding: &Embedding, params: &Params) -> Result<ColorTable, Error> {
     params.validate()?;
     crate::check_entries(tree, embedding)?;
-    let coloring = coloring::color(tree, &tree.branches(), embedding, params);
+    let orientation = Orientation::of(tree, &Scene::planar(tree, embedding, 1.0)?);
+    let coloring = coloring::color((tree, &tree.branches()), embedding, &orientation, params);
     let palette = &coloring.palette;
     let n_colors = if palette.is_continuous { N_COLORS } else { palette.len().min(usize::from(u8::MAX)) };
     let middle = |index: usize| (index as f32 + 0.5) / n_colors as f32;

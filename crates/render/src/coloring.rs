@@ -12,8 +12,10 @@
 use espalier_geom::{angle, math};
 use espalier_model::{Branch, Branches, Embedding, Tree};
 
+use crate::orientation::Orientation;
 use crate::palette::Palette;
 use crate::params::{ColorBy, Params};
+use crate::parts;
 use crate::unit::{self, LengthUnit};
 
 /// The share of the length whose radii the scale must tell apart.
@@ -58,8 +60,18 @@ pub(crate) struct Coloring {
 }
 
 /// Colours the tree as `params.color_by` says.
-pub(crate) fn color(tree: &Tree, branches: &Branches, embedding: &Embedding, params: &Params) -> Coloring {
+pub(crate) fn color(
+    (tree, branches): (&Tree, &Branches),
+    embedding: &Embedding,
+    orientation: &Orientation,
+    params: &Params,
+) -> Coloring {
     match params.color_by {
+        ColorBy::Part => parts::color(tree, branches, params.theme),
+        ColorBy::Label => by_label(tree),
+        ColorBy::OrientationLoss => {
+            by_loss("lost orientation (°)", (tree, params), |node| orientation.loss_deg[node])
+        }
         ColorBy::Radius => by_radius(tree, &local_radii(tree), params),
         ColorBy::BranchRadius => by_radius(tree, &branch_radii(tree, branches), params),
         ColorBy::Generation => by_generation(tree, branches, params),
@@ -232,6 +244,33 @@ fn by_branch(tree: &Tree, branches: &Branches) -> Coloring {
         .map(|node| [palette.value_of(branches.of_node(node).map_or(root_name, |branch| names[branch])); 2])
         .collect();
     Coloring { palette, ends, scale: None }
+}
+
+/// One colour for each label that the nodes have, in ascending order.
+fn by_label(tree: &Tree) -> Coloring {
+    let kinds: std::collections::BTreeSet<i32> =
+        tree.edges().map(|(node, _)| tree.nodes()[node].kind).collect();
+    let kinds: Vec<i32> = kinds.into_iter().collect();
+    let palette = Palette::names().first(kinds.len());
+    let value_of = |kind: i32| palette.value_of(kinds.binary_search(&kind).unwrap_or(0));
+    let ends = tree.nodes().iter().map(|node| [value_of(node.kind); 2]).collect();
+    let tick = |&kind: &i32| Tick { position: f64::from(value_of(kind)), text: label(kind), is_mean: false };
+    // More labels than fit beside the bar: the colours alone tell them apart.
+    let scale = (kinds.len() <= MAX_STEPS)
+        .then(|| Scale { caption: "label".to_owned(), ticks: kinds.iter().map(tick).collect() });
+    Coloring { palette, ends, scale }
+}
+
+/// The structures of the SWC format by their numbers.
+fn label(kind: i32) -> String {
+    match kind {
+        0 => "no label".to_owned(),
+        1 => "soma".to_owned(),
+        2 => "axon".to_owned(),
+        3 => "basal dendrite".to_owned(),
+        4 => "apical dendrite".to_owned(),
+        other => format!("label {other}"),
+    }
 }
 
 fn by_loss(caption: &str, (tree, params): (&Tree, &Params), loss_of: impl Fn(usize) -> f64) -> Coloring {

@@ -18,9 +18,9 @@ use glam::{DVec3, Vec2, Vec3};
 
 /// Below this tilt a cone counts as flat.
 const FLAT: f32 = 1e-6;
-/// From this radius on, a pixel's nine samples and its middle one differ by less than a level of colour away from the
-/// rim. Organs at their true widths are narrower on a page of the default size.
-const BROAD_PX: f32 = 64.0;
+/// How far beyond its outline a cone may fill the corner that it makes with another, in its radii: the fillet of two
+/// equal tubes reaches 0.1 to 0.2 of them, that of a thin one on a thick one 0.3, and fades before it ends.
+const FILLET_REACH: f64 = 0.5;
 
 /// A sphere at a node, in pixels.
 #[derive(Clone, Copy, Debug)]
@@ -69,12 +69,14 @@ pub(crate) enum Joint {
 }
 
 /// A place on a cone.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Hit {
     /// Height of the surface towards the viewer.
     pub z: f32,
     /// Height of the surface over the axis; 0 just outside the outline.
     pub height: f32,
+    /// The square of the height; outside of the outline what it would be, under 0. Smooth across the outline.
+    pub level: f32,
     /// From the axis point to the pixel.
     pub offset: Vec2,
     /// The radius there.
@@ -83,6 +85,19 @@ pub(crate) struct Hit {
     pub share: f32,
     /// Distance to the outline, negative inside.
     pub outside: f32,
+}
+
+impl Hit {
+    /// No place.
+    pub(crate) const NOTHING: Self = Self {
+        z: 0.0,
+        height: 0.0,
+        level: 0.0,
+        offset: Vec2::ZERO,
+        radius: 0.0,
+        share: 0.0,
+        outside: f32::INFINITY,
+    };
 }
 
 impl Cone {
@@ -100,10 +115,12 @@ impl Cone {
         // The surface at axis place s lies at x = s m − k r, shifted by up to |u_z| r where the axis is tilted:
         // this much on either side of an end even where the chain goes straight on.
         let lean = |radius: f64| (k.abs() + unit.z.abs()).min(1.0) * radius + 1.0;
-        let slack = |radius: f64, reach: f64| (reach + k.abs() + unit.z.abs()).min(1.0) * radius + 1.0;
+        let slack = |radius: f64, bend: &Bend| {
+            (bend.reach + k.abs() + unit.z.abs()).min(1.0) * (1.0 + FILLET_REACH) * radius + 1.0
+        };
         let range = [
-            (-slack(start.radius, before.reach)).min(length * seen - lean(end.radius)),
-            (length * seen + slack(end.radius, after.reach)).max(lean(start.radius)),
+            (-slack(start.radius, &before)).min(length * seen - lean(end.radius)),
+            (length * seen + slack(end.radius, &after)).max(lean(start.radius)),
         ];
         Self {
             start: start.center.as_vec3(),
@@ -137,9 +154,29 @@ impl Cone {
         (across * (1.0 - taper * taper).sqrt() - axis * taper).normalize_or(exact)
     }
 
-    /// Whether the surface hardly turns within a pixel, so that one sample says what many do.
-    pub(crate) fn is_broad(&self) -> bool {
-        self.radii[0].min(self.radii[1]) >= BROAD_PX
+    /// The smaller of its radii.
+    pub(crate) fn least_radius(&self) -> f32 {
+        self.radii[0].min(self.radii[1])
+    }
+
+    /// How far beyond its outline the cone may fill a corner.
+    pub(crate) fn fillet_px(&self) -> f32 {
+        FILLET_REACH as f32 * self.radii[0].max(self.radii[1])
+    }
+
+    /// How much of a say the cone has in what others do at a place, 0 to 1: it fades towards where the cone ends for
+    /// good, so that nothing jumps there.
+    pub(crate) fn say(&self, hit: &Hit) -> f32 {
+        let x = hit.share * self.length * self.m + hit.offset.dot(self.along);
+        let seen = self.length * self.m;
+        let beyond = |over: f32, slack: f32| (1.0 - over.max(0.0) / slack.max(1e-6)).clamp(0.0, 1.0);
+        let along = beyond(-x, -self.range[0]).min(beyond(x - seen, self.range[1] - seen));
+        along * beyond(hit.outside, self.fillet_px())
+    }
+
+    /// How far to the left of the axis a place lies, y down; under 0 to the right.
+    pub(crate) fn across(&self, hit: &Hit) -> f32 {
+        hit.offset.perp_dot(self.along)
     }
 
     /// The box that holds the cone: low and high corner.
@@ -206,9 +243,10 @@ impl Cone {
         let center = self.start.truncate() + self.along * (s * self.m);
         let offset = pixel - center;
         let radius = self.radii[0] + self.k * s;
-        let height = (radius * radius - offset.length_squared()).max(0.0).sqrt();
+        let level = radius * radius - offset.length_squared();
+        let height = level.max(0.0).sqrt();
         let share = if self.length > 0.0 { s / self.length } else { 0.0 };
-        Some(Hit { z: self.start.z + s * self.uz + height, height, offset, radius, share, outside })
+        Some(Hit { z: self.start.z + s * self.uz + height, height, level, offset, radius, share, outside })
     }
 
     /// The signed distance to the outline: of the hull of two discs, or of the larger if it holds the other.

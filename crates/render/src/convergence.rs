@@ -12,18 +12,19 @@
 use std::fmt::Write as _;
 
 use espalier_geom::math;
+use espalier_model::xml::escape;
 use espalier_model::{MethodRow, TracePoint};
 use glam::DVec2;
 
 use crate::drawing::{Group, Mark};
 use crate::furniture::{self, Heading};
-use crate::page::{MAX_PIXELS, Page, Pen};
+use crate::page::{MAX_PIXELS, Page};
+use crate::paint::Canvas;
 use crate::palette::{PageColors, Palette, Rgb, hex};
 use crate::params::Params;
-use crate::raster::Pixel;
 use crate::side_by_side::SideBySide;
 use crate::text::{Anchor, Face};
-use crate::{Error, paint, svg, unit};
+use crate::{Error, svg, unit};
 
 /// In layout units: font sizes, height of the chart, room to its left, to its right and below.
 const SMALL: f64 = 1.15;
@@ -53,7 +54,7 @@ pub struct Searched<'a> {
 /// Draws the energy of each method against its work.
 ///
 /// # Errors
-/// [`Error`] if a parameter is out of range or the figure would be over 2²⁵ pixels.
+/// [`Error`] if a parameter is out of range or the figure would be over 2²⁷ pixels.
 pub fn convergence(methods: &[Searched<'_>], params: &Params) -> Result<SideBySide, Error> {
     params.validate()?;
     let (face, colors, names) = (Face::built_in()?, PageColors::of(params.theme), Palette::names());
@@ -71,12 +72,9 @@ pub fn convergence(methods: &[Searched<'_>], params: &Params) -> Result<SideBySi
     if u64::from(width) * u64::from(height) > MAX_PIXELS {
         return Err(Error::TooLarge { width, height, limit: MAX_PIXELS });
     }
-    let pen = Pen { min_width_px: params.min_width_px, style: params.style };
-    let area = [DVec2::ZERO; 2];
-    let at = DVec2::ZERO;
-    let page = Page { width, height, unit_px: unit, px_per_mm: 1.0, origin_px: at, area, key_at: at, pen };
-    let pixels = vec![Pixel::EMPTY; width as usize * height as usize];
-    let png = paint::png(&page, &pixels, &groups, (colors.background, &face))?;
+    let mut canvas = Canvas::new([width, height], colors.background)?;
+    canvas.mark(&groups, &face);
+    let png = canvas.png();
     let title = said.title.unwrap_or_else(|| "convergence".to_owned());
     Ok(SideBySide { png, svg: document(&title, &groups, [width, height], &colors) })
 }
@@ -356,7 +354,7 @@ fn document(title: &str, groups: &[Group], [width, height]: [u32; 2], colors: &P
          width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
          data-format=\"espalier-convergence-svg\" data-version=\"1\">\n<title>{}</title>\n\
          <rect id=\"background\" width=\"{width}\" height=\"{height}\" fill=\"{}\"/>",
-        svg::escaped(title),
+        escape(title),
         hex(colors.background)
     );
     svg::write_groups(&mut out, groups);

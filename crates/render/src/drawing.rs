@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use crate::palette::{Palette, Rgb};
-use crate::text::Anchor;
+use crate::text::{Anchor, Face};
 
 /// A mark on the page, in pixels, y down.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,6 +54,24 @@ pub(crate) enum Mark {
         /// Its colour.
         color: Rgb,
     },
+}
+
+impl Mark {
+    /// The corners of the box that it takes.
+    pub(crate) fn bounds(&self, face: &Face) -> [DVec2; 2] {
+        match self {
+            Self::Text { at, size_px, anchor, text, .. } => {
+                let width = f64::from(face.width(text, *size_px as f32));
+                let left = at.x - width * f64::from(anchor.share());
+                [DVec2::new(left, at.y - size_px), DVec2::new(left + width, at.y + 0.3 * size_px)]
+            }
+            Self::Line { from, to, width_px, .. } => [from.min(*to) - *width_px, from.max(*to) + *width_px],
+            Self::Bar { corner, size, .. } => [*corner, *corner + *size],
+            Self::Ring { center, radius_px, width_px, .. } => {
+                [*center - (radius_px + width_px), *center + (radius_px + width_px)]
+            }
+        }
+    }
 }
 
 /// Marks that belong together, under a name.

@@ -53,9 +53,9 @@ pub enum Error {
     /// The font that draws the text cannot be read.
     #[error("the built-in font cannot be read")]
     Font(#[from] ab_glyph::InvalidFont),
-    /// The PNG encoder refused.
-    #[error("the PNG cannot be encoded")]
-    Png(#[from] image::ImageError),
+    /// The font cannot go into the PDF.
+    #[error("the built-in font cannot be put into the PDF")]
+    Pdf(#[from] subsetter::Error),
     /// The EXR encoder refused.
     #[error("the EXR cannot be encoded")]
     Exr(#[from] exr::error::Error),
@@ -70,7 +70,7 @@ impl Diagnose for Error {
             Self::View { .. } => "E-RENDER-VIEW",
             Self::TooLarge { .. } => "E-RENDER-SIZE",
             Self::Font(_) => "E-RENDER-FONT",
-            Self::Png(_) => "E-RENDER-PNG",
+            Self::Pdf(_) => "E-RENDER-PDF",
             Self::Exr(_) => "E-RENDER-EXR",
         }
     }
@@ -80,7 +80,7 @@ impl Diagnose for Error {
             Self::Param(error) => error.class(),
             Self::Mismatch { .. } | Self::Number { .. } | Self::View { .. } => Class::Input,
             Self::TooLarge { .. } => Class::Limit,
-            Self::Font(_) | Self::Png(_) | Self::Exr(_) => Class::Internal,
+            Self::Font(_) | Self::Pdf(_) | Self::Exr(_) => Class::Internal,
         }
     }
 

@@ -172,8 +172,10 @@ pub(crate) fn scale_bar(page: &Page, at: DVec2, params: &Params, colors: &PageCo
 pub(crate) fn root_mark(page: &Page, tree: &Tree, scene: &Scene, colors: &PageColors) -> Group {
     let unit = page.unit_px;
     let center = page.px(scene.points_mm[0].truncate());
-    let radius_px = (page.radius_px(scene.radii_mm[0]) + 0.35 * unit).max(0.65 * unit);
-    let ring = |width: f64, color| Mark::Ring { center, radius_px, width_px: width * unit, color };
+    // The ring marks the node; its name stands beside the tube.
+    let ring_px = 0.65 * unit;
+    let radius_px = page.radius_px(scene.radii_mm[0]).max(ring_px);
+    let ring = |width: f64, color| Mark::Ring { center, radius_px: ring_px, width_px: width * unit, color };
     let away = scene.away_from_branches(tree, 4.0 * unit / page.px_per_mm);
     let away = DVec2::new(away.x, -away.y);
     let size_px = BODY * unit;

@@ -3,11 +3,17 @@
 use espalier_model::{Branches, Embedding, Tree, View};
 
 use crate::furniture::Heading;
-use crate::params::Params;
+use crate::orientation::Orientation;
+use crate::params::{Compass, Params};
 use crate::unit::{self, LengthUnit};
 
 /// The heading of the map.
-pub(crate) fn planar(tree: &Tree, branches: &Branches, embedding: &Embedding, params: &Params) -> Heading {
+pub(crate) fn planar(
+    (tree, branches): (&Tree, &Branches),
+    embedding: &Embedding,
+    orientation: &Orientation,
+    params: &Params,
+) -> Heading {
     let losses = &embedding.losses;
     let mut verdict = vec![verdict(embedding)];
     verdict.extend(overlaps(embedding));
@@ -26,6 +32,10 @@ pub(crate) fn planar(tree: &Tree, branches: &Branches, embedding: &Embedding, pa
     ]);
     let mut facts = size_of(tree, branches, params);
     facts.push("a map, not a projection: it keeps lengths and bends, not directions".to_owned());
+    if orientation.axes.is_some() && params.compass != Compass::None {
+        let off = degrees(orientation.mean_loss_deg);
+        facts.push(format!("letters at the edges: where most of it points, off by {off} on average; at branches: where they point instead"));
+    }
     Heading { title: params.title.clone(), verdict, facts }
 }
 

@@ -19,15 +19,16 @@ use crate::cone::{Ball, Cone, Joint};
 use crate::drawing::{Group, Mark};
 use crate::furniture::{self, Heading};
 use crate::kinship::Kinship;
-use crate::outline::outline;
+use crate::outline::{outline, svg_data};
 use crate::page::{MAX_PIXELS, Page, Pen};
+use crate::paint::Canvas;
 use crate::palette::{PageColors, Palette, Rgb, hex};
 use crate::params::{Params, Style};
-use crate::raster::{self, Drawn, Job, Pixel};
+use crate::raster::{self, Drawn, Job, Raster};
 use crate::scene::Scene;
 use crate::side_by_side::SideBySide;
 use crate::text::{Anchor, Face};
-use crate::{Error, MAX_LAYERS, heading, paint, svg, unit};
+use crate::{Error, MAX_LAYERS, heading, svg, unit};
 
 /// In layout units: font sizes of panel names and of the key, space between panels, around a tree, for the key.
 const TITLE: f64 = 1.6;
@@ -62,7 +63,7 @@ pub enum ChangeOf {
 ///
 /// # Errors
 /// [`Error`] if a parameter is out of range, the embedding is another tree's, a number cannot be drawn, or the figure
-/// would be over 2²⁵ pixels.
+/// would be over 2²⁷ pixels.
 pub fn juxtaposed(
     (found, embedding): (&Juxtaposition, &Embedding),
     change: ChangeOf,
@@ -80,12 +81,12 @@ pub fn juxtaposed(
     let artist = Artist { found, params, scene, coloring, colors, face: Face::built_in()? };
     let sheet = artist.lay_out(&heading_of(found, embedding, params), names)?;
     let (width, height) = (params.width_px, sheet.height);
-    let mut pixels = vec![Pixel::EMPTY; width as usize * height as usize];
+    let mut canvas = Canvas::new([width, height], colors.background)?;
     for panel in &sheet.panels {
-        artist.draw(panel, sheet.style, &mut pixels);
+        artist.draw(panel, sheet.style, &mut canvas);
     }
-    let page = Page { width, height, ..sheet.panels[0].page };
-    let png = paint::png(&page, &pixels, &sheet.groups, (colors.background, &artist.face))?;
+    canvas.mark(&sheet.groups, &artist.face);
+    let png = canvas.png();
     let title = params.title.as_deref().unwrap_or("juxtaposition");
     Ok(SideBySide { png, svg: artist.svg(&sheet, title) })
 }
@@ -422,27 +423,20 @@ impl Artist<'_> {
         Kinship::new(&self.found.shared, &self.found.shared.branches(), &self.scene, page.px_per_mm)
     }
 
-    fn draw(&self, panel: &Panel, style: Style, pixels: &mut [Pixel]) {
+    fn draw(&self, panel: &Panel, style: Style, canvas: &mut Canvas) {
         let page = local(&panel.page);
-        let size = size_of(&page);
-        let drawn = raster::rasterise(&Job {
-            size,
-            drawn: &self.edges(panel.tree, &page, style),
-            kinship: &self.kinship(&page),
+        let drawn = self.edges(panel.tree, &page, style);
+        let kinship = self.kinship(&page);
+        let raster = Raster::new(Job {
+            size: size_of(&page),
+            drawn: &drawn,
+            kinship: &kinship,
             palette: &self.coloring.palette,
             colors: self.colors,
             style,
             has_depth: false,
         });
-        let width = self.params.width_px as usize;
-        let corner = [panel.page.area[0].x as usize, panel.page.area[0].y as usize];
-        let n_columns = size[0].min(width.saturating_sub(corner[0]));
-        for (row, line) in drawn.chunks(size[0]).enumerate() {
-            let start = (corner[1] + row) * width + corner[0];
-            if let Some(target) = pixels.get_mut(start..start + n_columns) {
-                target.copy_from_slice(&line[..n_columns]);
-            }
-        }
+        canvas.surface(&raster, [panel.page.area[0].x as usize, panel.page.area[0].y as usize], |_, _| ());
     }
 
     fn svg(&self, sheet: &Sheet, title: &str) -> String {
@@ -455,7 +449,7 @@ impl Artist<'_> {
              xmlns:xlink=\"http://www.w3.org/1999/xlink\" version=\"1.1\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
              data-format=\"espalier-juxtaposition-svg\" data-version=\"1\">\n<title>{}</title>\n\
              <rect id=\"background\" width=\"{width}\" height=\"{height}\" fill=\"{}\"/>",
-            svg::escaped(title),
+            espalier_model::xml::escape(title),
             hex(self.colors.background)
         );
         for panel in &sheet.panels {
@@ -478,7 +472,7 @@ impl Artist<'_> {
             run.nodes[1..].iter().filter_map(|&node| self.radius_mm(tree, node)).fold(0.0, f64::max)
         };
         runs.sort_by(|a, b| a.is_there.cmp(&b.is_there).then(width_mm(a).total_cmp(&width_mm(b))));
-        if page.pen.style == Style::PseudoSurface {
+        if page.pen.style != Style::Line {
             let rim = hex(self.colors.rim);
             let _ = writeln!(out, "<g stroke=\"{rim}\" stroke-opacity=\"0.75\" stroke-width=\"1.3\">");
             for (run_idx, _) in runs.iter().enumerate().filter(|(_, run)| run.is_there) {
@@ -522,7 +516,7 @@ impl Artist<'_> {
             run.key.1.name(),
             run.is_there
         );
-        if run.is_there && page.pen.style == Style::PseudoSurface {
+        if run.is_there && page.pen.style != Style::Line {
             let radius = |place: usize| {
                 // At a fork the run begins with its own tube.
                 let node = if place == 0 && self.found.nodes[run.nodes[0]].row != run.key.0 {
@@ -534,7 +528,7 @@ impl Artist<'_> {
             };
             let points: Vec<(DVec2, f64)> =
                 run.nodes.iter().enumerate().map(|(place, &node)| (center(node), radius(place))).collect();
-            let _ = writeln!(out, "<path {ids} d=\"{}\" fill=\"{fill}\"/>", outline(&points));
+            let _ = writeln!(out, "<path {ids} d=\"{}Z\" fill=\"{fill}\"/>", svg_data(&outline(&points)));
             return;
         }
         let mut path = String::new();

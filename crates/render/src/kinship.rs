@@ -1,7 +1,7 @@
 //! How far apart two places of the tree are along the tree.
 //!
-//! **Input** the branches and the drawn arc length at each node. **Output** whether the path between two places is
-//! at most so long.
+//! **Input** the branches and the drawn arc length at each node. **Output** the length of the path between two places,
+//! up to a limit.
 //! **Steps** climb from the branch that stands later in preorder to its hub, adding up lengths, until both places
 //! are on one branch or the limit is passed.
 //! **Guarantees** at most [`MAX_CLIMB`] steps; beyond that the places count as far apart.
@@ -42,19 +42,26 @@ impl Kinship {
         }
     }
 
-    /// Whether the path between two places, each on the edge above a node at an arc length, is at most `limit_px`.
-    pub(crate) fn is_near(
+    /// The branch of the edge above a node.
+    pub(crate) fn branch_of(&self, node: u32) -> u32 {
+        self.branch_of[node as usize]
+    }
+
+    /// The length of the path between two places, each on the edge above a node at an arc length; infinite if it is
+    /// over `limit_px`.
+    pub(crate) fn path_px(
         &self,
         (node_a, arc_a): (u32, f32),
         (node_b, arc_b): (u32, f32),
         limit_px: f32,
-    ) -> bool {
+    ) -> f32 {
         let mut a = (self.branch_of[node_a as usize], arc_a);
         let mut b = (self.branch_of[node_b as usize], arc_b);
         let mut path = 0.0;
         for _ in 0..MAX_CLIMB {
             if a.0 == b.0 {
-                return path + (a.1 - b.1).abs() <= limit_px;
+                path += (a.1 - b.1).abs();
+                return if path <= limit_px { path } else { f32::INFINITY };
             }
             // In preorder the later branch cannot be an ancestor of the earlier; ROOT is everybody's.
             let a_is_deeper = b.0 == ROOT || (a.0 != ROOT && a.0 > b.0);
@@ -63,10 +70,10 @@ impl Kinship {
             path += deeper.1 - hub_arc;
             *deeper = (parent, hub_arc);
             if path > limit_px {
-                return false;
+                return f32::INFINITY;
             }
         }
-        false
+        f32::INFINITY
     }
 }
 
@@ -100,13 +107,14 @@ mod tests {
         let scene = Scene {
             points_mm: tree.nodes().iter().map(|node| node.position_mm).collect(),
             radii_mm: vec![1.0; 8],
+            turn_deg: 0,
         };
         let kinship = Kinship::new(&tree, &tree.branches(), &scene, 2.0);
         let end = |node: u32| (node, kinship.arc_px[node as usize]);
         for (a, b, path_px) in [(3, 4, 8.0), (3, 6, 48.0), (1, 7, 24.0), (2, 3, 4.0), (5, 5, 0.0)] {
             for (a, b) in [(a, b), (b, a)] {
-                assert!(kinship.is_near(end(a), end(b), path_px + 0.01), "{a} {b}");
-                assert!(!kinship.is_near(end(a), end(b), path_px - 0.01), "{a} {b}");
+                assert_eq!(kinship.path_px(end(a), end(b), path_px + 0.01), path_px, "{a} {b}");
+                assert_eq!(kinship.path_px(end(a), end(b), path_px - 0.01), f32::INFINITY, "{a} {b}");
             }
         }
     }

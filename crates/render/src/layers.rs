@@ -1,155 +1,197 @@
 //! The map as EXR: at each pixel what is seen there, above all the point of the patient.
 //!
-//! **Input** the raster with the tree and its embedding. **Output** one OpenEXR part, 32-bit float channels, ZIP in
-//! blocks of 16 lines. Pixel (x, y) is the pixel (x, y) of the PNG.
+//! **Input** the raster, band by band, with the tree and its embedding. **Output** one OpenEXR part, ZIP in blocks of 16
+//! lines. Pixel (x, y) is the pixel (x, y) of the PNG.
 //!
 //! | channel | what | unit |
 //! |---|---|---|
-//! | `R G B` | the picture, linear light, premultiplied by `A` | |
-//! | `A` | the share of the pixel that the tree covers; 0 is background | |
+//! | `R G B` | the picture, linear light, premultiplied by `A`; 16 bits | |
+//! | `A` | the share of the pixel that the tree covers; 0 is background; 16 bits | |
+//! | `across.mm` | how far to the left of the centreline, seen from the root | mm |
 //! | `radius.mm` | the radius of the organ there, as in the tree | mm |
 //! | `height.mm` | the height of the drawn surface over its centreline | mm |
-//! | `normal.X Y Z` | the unit normal of the drawn surface: right, up, to the viewer | |
+//! | `normal.X Y Z` | the unit normal of the drawn surface: right, up, to the viewer; 16 bits | |
 //! | `arc.mm` | the length of the path from the root, in space | mm |
 //! | `branch.id` | the branch, as in `nodes.tsv` and the SVG; −1 for background and for a tree of one node | |
 //! | `node.id` | the lower node of the edge, as in `nodes.tsv`; −1 for background | |
 //! | `position.X Y Z` | the point on the centreline in the patient, RAS+ | mm |
 //! | `loss.angle` | angle loss at the upper node of the edge | degrees |
 //! | `loss.length` | length loss of the edge, 0.01 = 1 % | |
+//! | `loss.orientation` | by how much the edge runs otherwise in space than the map's letters say | degrees |
 //!
-//! Everywhere that `A` is 0, ids are −1 and all else is 0.
+//! Everywhere that `A` is 0, ids are −1 and all else is 0. Channels have 32 bits where nothing else is said. Lengths are
+//! rounded to 1/256 of a pixel, so that the rest of their digits need no room.
 //! **Guarantees** the same bytes for any number of threads: blocks are compressed in parallel and written in order.
-//! **Source** OpenEXR 2 scan-line files.
+//! **Source** OpenEXR 2 scan-line files. The blocks are packed here: the crate's own packing takes three times as long.
 
 use std::io::Cursor;
 
+use espalier_geom::math;
 use espalier_model::{Branches, Embedding, Tree};
-use exr::block::lines::LineRefMut;
+use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
 use exr::block::writer::ChunksWriter;
-use exr::block::{BlockIndex, UncompressedBlock};
-use exr::image::write::WritableImage;
-use exr::image::write::layers::{LayersWriter, WritableLayers};
-use exr::image::write::samples::{SamplesWriter, WritableSamples};
-use exr::image::{AnyChannel, AnyChannels, Blocks, Encoding, Image, Layer};
-use exr::math::{RoundingMode, Vec2};
-use exr::meta::attribute::{LevelMode, LineOrder, SampleType, Text};
+use exr::compression::Compression;
+use exr::math::Vec2;
+use exr::meta::BlockDescription;
+use exr::meta::attribute::{ChannelDescription, LineOrder, SampleType, Text};
 use exr::meta::header::{Header, LayerAttributes};
-use rayon::prelude::*;
+use exr::prelude::f16;
+use flate2::{Compress, FlushCompress, Status};
 
 use crate::Error;
 use crate::coloring::{angle_loss_deg, length_loss};
+use crate::orientation::Orientation;
 use crate::page::Page;
 use crate::palette::linear_from_srgb;
 use crate::raster::Pixel;
 
-/// Blocks of 16 lines in memory at a time, some 4 MB each on the largest pages.
-const BLOCKS_AT_ONCE: usize = 64;
+/// Lines of a block, as OpenEXR fixes them for this compression.
+const BLOCK: usize = 16;
+/// Deflate's effort: from 3 to 6 the file shrinks by 3 % and takes twice as long.
+const LEVEL: u32 = 3;
+/// Steps of a length, of a pixel.
+const STEPS_PER_PX: f64 = 256.0;
 
 /// What a channel holds at a covered pixel.
 type Read = fn(&Layers<'_>, &Pixel) -> f32;
 
+const F16: SampleType = SampleType::F16;
+const F32: SampleType = SampleType::F32;
+
 /// The channels, in the alphabetic order in which OpenEXR stores them, with their background.
-const CHANNELS: [(&str, f32, Read); 17] = [
-    ("A", 0.0, |_, pixel| pixel.coverage),
-    ("B", 0.0, |layers, pixel| layers.light(pixel, 2)),
-    ("G", 0.0, |layers, pixel| layers.light(pixel, 1)),
-    ("R", 0.0, |layers, pixel| layers.light(pixel, 0)),
-    ("arc.mm", 0.0, |layers, pixel| layers.along(pixel, |node| layers.arc_mm[node])),
-    ("branch.id", -1.0, |layers, pixel| layers.branch(pixel)),
-    ("height.mm", 0.0, |layers, pixel| (f64::from(pixel.height_px) / layers.px_per_mm) as f32),
-    ("loss.angle", 0.0, |layers, pixel| layers.angle_loss_deg[pixel.node as usize]),
-    ("loss.length", 0.0, |layers, pixel| layers.length_loss[pixel.node as usize]),
-    ("node.id", -1.0, |_, pixel| pixel.node as f32),
-    ("normal.X", 0.0, |_, pixel| pixel.normal[0]),
-    ("normal.Y", 0.0, |_, pixel| -pixel.normal[1]),
-    ("normal.Z", 0.0, |_, pixel| pixel.normal[2]),
-    ("position.X", 0.0, |layers, pixel| layers.along(pixel, |node| layers.tree.position_mm(node).x)),
-    ("position.Y", 0.0, |layers, pixel| layers.along(pixel, |node| layers.tree.position_mm(node).y)),
-    ("position.Z", 0.0, |layers, pixel| layers.along(pixel, |node| layers.tree.position_mm(node).z)),
-    ("radius.mm", 0.0, |layers, pixel| layers.along(pixel, |node| layers.tree.nodes()[node].radius_mm)),
+const CHANNELS: [(&str, SampleType, f32, Read); 19] = [
+    ("A", F16, 0.0, |_, pixel| pixel.coverage),
+    ("B", F16, 0.0, |layers, pixel| layers.light(pixel, 2)),
+    ("G", F16, 0.0, |layers, pixel| layers.light(pixel, 1)),
+    ("R", F16, 0.0, |layers, pixel| layers.light(pixel, 0)),
+    ("across.mm", F32, 0.0, |layers, pixel| layers.drawn_mm(pixel.across_px)),
+    ("arc.mm", F32, 0.0, |layers, pixel| layers.along(pixel, |node| layers.arc_mm[node])),
+    ("branch.id", F32, -1.0, |layers, pixel| layers.branch(pixel)),
+    ("height.mm", F32, 0.0, |layers, pixel| layers.drawn_mm(pixel.height_px)),
+    ("loss.angle", F32, 0.0, |layers, pixel| layers.angle_loss_deg[pixel.node as usize]),
+    ("loss.length", F32, 0.0, |layers, pixel| layers.length_loss[pixel.node as usize]),
+    ("loss.orientation", F32, 0.0, |layers, pixel| layers.orientation_loss_deg[pixel.node as usize]),
+    ("node.id", F32, -1.0, |_, pixel| pixel.node as f32),
+    ("normal.X", F16, 0.0, |_, pixel| pixel.normal[0]),
+    ("normal.Y", F16, 0.0, |_, pixel| -pixel.normal[1]),
+    ("normal.Z", F16, 0.0, |_, pixel| pixel.normal[2]),
+    ("position.X", F32, 0.0, |layers, pixel| layers.along(pixel, |node| layers.tree.position_mm(node).x)),
+    ("position.Y", F32, 0.0, |layers, pixel| layers.along(pixel, |node| layers.tree.position_mm(node).y)),
+    ("position.Z", F32, 0.0, |layers, pixel| layers.along(pixel, |node| layers.tree.position_mm(node).z)),
+    ("radius.mm", F32, 0.0, |layers, pixel| layers.along(pixel, |node| layers.tree.nodes()[node].radius_mm)),
 ];
 
 /// What the channels read.
 #[derive(Debug)]
 pub(crate) struct Layers<'a> {
     tree: &'a Tree,
-    pixels: &'a [Pixel],
-    size: [usize; 2],
-    px_per_mm: f64,
-    origin_px: glam::DVec2,
+    page: &'a Page,
+    turn_deg: u32,
+    /// Steps of a length, per mm.
+    steps_per_mm: f64,
     branch_of: Vec<f32>,
     arc_mm: Vec<f64>,
     angle_loss_deg: Vec<f32>,
     length_loss: Vec<f32>,
+    orientation_loss_deg: Vec<f32>,
     light_of_byte: Vec<f32>,
+    /// A whole block of background, packed: most of a picture is paper.
+    paper: Vec<u8>,
 }
 
 impl<'a> Layers<'a> {
-    /// Prepares the layers of a raster.
+    /// Prepares the layers of a page.
     pub(crate) fn new(
-        tree: &'a Tree,
-        branches: &Branches,
+        (tree, branches): (&'a Tree, &Branches),
         embedding: &Embedding,
-        (page, pixels): (&Page, &'a [Pixel]),
+        orientation: &Orientation,
+        (page, turn_deg): (&'a Page, u32),
     ) -> Self {
         let mut arc_mm = vec![0.0; tree.n_nodes()];
         for (node, parent) in tree.edges() {
             arc_mm[node] = arc_mm[parent] + tree.edge_length_mm(node);
         }
         let nodes = 0..tree.n_nodes();
-        Self {
+        // A power of two, so that rounded numbers end in zero bits.
+        let steps = math::log2((STEPS_PER_PX * page.px_per_mm).clamp(f64::MIN_POSITIVE, 1e100));
+        let mut layers = Self {
             tree,
-            pixels,
-            size: [page.width as usize, page.height as usize],
-            px_per_mm: page.px_per_mm,
-            origin_px: page.origin_px,
+            page,
+            turn_deg,
+            steps_per_mm: math::pow(2.0, math::ceil(steps)),
             branch_of: nodes.clone().map(|n| branches.of_node(n).map_or(-1.0, |b| b as f32)).collect(),
             arc_mm,
             angle_loss_deg: nodes.clone().map(|n| angle_loss_deg(tree, embedding, n) as f32).collect(),
             length_loss: nodes.map(|n| length_loss(tree, embedding, n) as f32).collect(),
+            orientation_loss_deg: orientation.loss_deg.iter().map(|&loss| loss as f32).collect(),
             light_of_byte: (0..=255_u8).map(|b| linear_from_srgb(f64::from(b) / 255.0) as f32).collect(),
-        }
+            paper: Vec::new(),
+        };
+        layers.paper = layers.pack(&vec![Pixel::EMPTY; BLOCK * page.width as usize]);
+        layers
     }
 
-    /// The file.
-    pub(crate) fn encode(&self) -> Result<Vec<u8>, Error> {
-        let list = CHANNELS
-            .iter()
-            .map(|&(name, background, read)| AnyChannel {
-                name: Text::from(name),
-                sample_data: Samples { layers: self, background, read },
-                quantize_linearly: true,
-                sampling: Vec2(1, 1),
-            })
-            .collect();
-        let encoding = Encoding {
-            compression: exr::compression::Compression::ZIP16,
-            blocks: Blocks::ScanLines,
-            line_order: LineOrder::Increasing,
+    /// The packed blocks of a band of rows, whose first is a multiple of a block's.
+    pub(crate) fn blocks(&self, pixels: &[Pixel]) -> Vec<Vec<u8>> {
+        let n_whole = BLOCK * self.page.width as usize;
+        let packed = |block: &[Pixel]| {
+            let is_paper = block.len() == n_whole && !block.iter().any(Pixel::is_covered);
+            if is_paper { self.paper.clone() } else { self.pack(block) }
         };
+        pixels.chunks(n_whole).map(packed).collect()
+    }
+
+    /// A block as OpenEXR stores it: line by line, in a line channel by channel; then the bytes of even places before
+    /// those of odd ones, as differences, deflated. What does not get smaller is stored as it is.
+    fn pack(&self, block: &[Pixel]) -> Vec<u8> {
+        let mut plain = Vec::new();
+        for line in block.chunks(self.page.width as usize) {
+            for &(_, sample_type, background, read) in &CHANNELS {
+                let values =
+                    line.iter().map(|pixel| if pixel.is_covered() { read(self, pixel) } else { background });
+                if sample_type == F16 {
+                    plain.extend(values.flat_map(|value| f16::from_f32(value).to_le_bytes()));
+                } else {
+                    plain.extend(values.flat_map(f32::to_le_bytes));
+                }
+            }
+        }
+        let (even, odd) = (plain.iter().step_by(2), plain.iter().skip(1).step_by(2));
+        let mut last = None;
+        let difference = |&byte: &u8| {
+            let before = last.replace(byte);
+            before.map_or(byte, |before| byte.wrapping_sub(before).wrapping_add(128))
+        };
+        let differences: Vec<u8> = even.chain(odd).map(difference).collect();
+        deflate(&differences).filter(|packed| packed.len() < plain.len()).unwrap_or(plain)
+    }
+
+    /// The file of all blocks, from the top.
+    pub(crate) fn file(&self, blocks: Vec<Vec<u8>>) -> Result<Vec<u8>, Error> {
+        let channels = CHANNELS.iter().map(|&(name, sample_type, ..)| ChannelDescription {
+            name: Text::from(name),
+            sample_type,
+            quantize_linearly: true,
+            sampling: Vec2(1, 1),
+        });
         // Only fields with a fixed place: the crate keeps free attributes in a hash map, whose order varies.
         let attributes = LayerAttributes {
             software_name: Text::new_or_none("espalier"),
             comments: Text::new_or_none(self.comment()),
             ..LayerAttributes::default()
         };
-        let layer = Layer::new(Vec2(self.size[0], self.size[1]), attributes, encoding, AnyChannels { list });
-        let image = Image::from_layer(layer);
-        let headers = image.write().infer_meta_data();
-        let rows = image.layer_data.create_writer(&headers);
-        let mut bytes = Cursor::new(Vec::new());
-        exr::block::write(&mut bytes, headers, true, |meta, writer| {
-            let blocks: Vec<_> = exr::block::enumerate_ordered_header_block_indices(&meta.headers).collect();
-            let compressed = |&(place, index): &(usize, BlockIndex)| {
-                let data = rows.extract_uncompressed_block(&meta.headers, index);
-                Ok((place, UncompressedBlock { index, data }.compress_to_chunk(&meta.headers)?))
-            };
-            // In groups, so that few blocks wait uncompressed.
-            for group in blocks.chunks(BLOCKS_AT_ONCE) {
-                let chunks: Vec<_> = group.par_iter().map(compressed).collect::<exr::error::Result<_>>()?;
-                for (place, chunk) in chunks {
-                    writer.write_chunk(place, chunk)?;
-                }
+        let size = Vec2(self.page.width as usize, self.page.height as usize);
+        let header = Header::new(Text::from(""), size, channels.collect())
+            .with_encoding(Compression::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing)
+            .with_attributes(attributes);
+        let n_bytes = blocks.iter().map(Vec::len).sum::<usize>();
+        let mut bytes = Cursor::new(Vec::with_capacity(n_bytes + 32 * blocks.len() + 4096));
+        exr::block::write(&mut bytes, std::iter::once(header).collect(), true, |_, writer| {
+            for (index, compressed_pixels_le) in blocks.into_iter().enumerate() {
+                let y_coordinate = (index * BLOCK) as i32;
+                let block = CompressedScanLineBlock { y_coordinate, compressed_pixels_le };
+                let compressed_block = CompressedBlock::ScanLine(block);
+                writer.write_chunk(index, Chunk { layer_index: 0, compressed_block })?;
             }
             Ok(())
         })?;
@@ -158,13 +200,16 @@ impl<'a> Layers<'a> {
 
     /// What a reader needs beside the channel names.
     fn comment(&self) -> String {
+        let Page { px_per_mm, origin_px, .. } = self.page;
         format!(
-            "espalier-planar-exr 1; position in RAS+ mm; plane_x_mm = (x + 0.5 - {:.4}) * {:.9e}, \
-             plane_y_mm = ({:.4} - y - 0.5) * {:.9e}; A = 0 is background; losses: degrees, share",
-            self.origin_px.x,
-            1.0 / self.px_per_mm,
-            self.origin_px.y,
-            1.0 / self.px_per_mm
+            "espalier-planar-exr 2; position in RAS+ mm; plane_x_mm = (x + 0.5 - {:.4}) * {:.9e}, \
+             plane_y_mm = ({:.4} - y - 0.5) * {:.9e}; turned by {} degrees counter-clockwise; A = 0 is background; \
+             losses: degrees, share",
+            origin_px.x,
+            1.0 / px_per_mm,
+            origin_px.y,
+            1.0 / px_per_mm,
+            self.turn_deg
         )
     }
 
@@ -176,47 +221,34 @@ impl<'a> Layers<'a> {
         self.branch_of[pixel.node as usize]
     }
 
-    /// A quantity of nodes at the pixel's place on its edge.
+    /// A length in the picture.
+    fn drawn_mm(&self, length_px: f32) -> f32 {
+        self.rounded(f64::from(length_px) / self.page.px_per_mm)
+    }
+
+    /// A quantity of nodes at the pixel's place on its edge, mm.
     fn along(&self, pixel: &Pixel, of_node: impl Fn(usize) -> f64) -> f32 {
         let node = pixel.node as usize;
         let parent = self.tree.parent(node).unwrap_or(node);
         let (from, to) = (of_node(parent), of_node(node));
-        (from + f64::from(pixel.share) * (to - from)) as f32
+        self.rounded(from + f64::from(pixel.share) * (to - from))
+    }
+
+    fn rounded(&self, length_mm: f64) -> f32 {
+        let steps = length_mm * self.steps_per_mm;
+        // Beyond this no digits are left to round.
+        if steps.abs() < 1e15 {
+            (math::floor(steps + 0.5) / self.steps_per_mm) as f32
+        } else {
+            length_mm as f32
+        }
     }
 }
 
-/// One channel, read pixel by pixel while it is written, so that no copy of the raster is needed.
-#[derive(Clone, Copy)]
-struct Samples<'a> {
-    layers: &'a Layers<'a>,
-    background: f32,
-    read: Read,
-}
-
-impl<'a> WritableSamples<'_> for Samples<'a> {
-    type Writer = Samples<'a>;
-
-    fn sample_type(&self) -> SampleType {
-        SampleType::F32
-    }
-
-    fn infer_level_modes(&self) -> (LevelMode, RoundingMode) {
-        (LevelMode::Singular, RoundingMode::Down)
-    }
-
-    fn create_samples_writer(&self, _: &Header) -> Self::Writer {
-        *self
-    }
-}
-
-impl SamplesWriter for Samples<'_> {
-    fn extract_line(&self, line: LineRefMut<'_>) {
-        let Vec2(x, y) = line.location.position;
-        let first = y * self.layers.size[0] + x;
-        // The line is memory of just this size, so writing to it cannot fail.
-        let _ = line.write_samples(|i| {
-            let pixel = &self.layers.pixels[first + i];
-            if pixel.is_covered() { (self.read)(self.layers, pixel) } else { self.background }
-        });
-    }
+/// A zlib stream; `None` if it would be larger than the bytes themselves.
+fn deflate(bytes: &[u8]) -> Option<Vec<u8>> {
+    let mut packed = Vec::with_capacity(bytes.len());
+    let mut packer = Compress::new(flate2::Compression::new(LEVEL), true);
+    let status = packer.compress_vec(bytes, &mut packed, FlushCompress::Finish);
+    matches!(status, Ok(Status::StreamEnd)).then_some(packed)
 }

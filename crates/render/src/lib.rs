@@ -22,12 +22,14 @@ mod scene;
 
 mod color_table;
 mod coloring;
+mod orientation;
 mod palette;
 mod unit;
 
 mod drawing;
 mod furniture;
 mod heading;
+mod letters;
 mod text;
 
 mod page;
@@ -43,6 +45,8 @@ mod shade;
 mod layers;
 mod outline;
 mod paint;
+mod pdf;
+mod png;
 mod svg;
 
 mod chart;
@@ -65,11 +69,14 @@ pub use error::Error;
 use furniture::Heading;
 pub use juxtaposed::{ChangeOf, juxtaposed};
 use kinship::Kinship;
+use layers::Layers;
 pub use map::{Beside, Place, PlanarMap, reach};
+use orientation::Orientation;
 use page::{Needs, Page, Pen};
+use paint::Canvas;
 use palette::PageColors;
-pub use params::{ColorBy, Compass, Params, Style, Theme, Unit};
-use raster::{Drawn, Job, Pixel};
+pub use params::{ColorBy, Compass, Fit, Params, Style, Theme, Unit};
+use raster::{Drawn, Job, Pixel, Raster};
 use scene::Scene;
 pub use side_by_side::{Panel, Section, SideBySide, side_by_side};
 use text::Face;
@@ -81,6 +88,8 @@ pub struct Rendered {
     pub png: Vec<u8>,
     /// The map as SVG, one path per branch with the id `branch-N`.
     pub svg: String,
+    /// The map as PDF, 300 pixels to an inch; `None` if [`Params::pdf`] is false.
+    pub pdf: Option<Vec<u8>>,
     /// The map's layers as OpenEXR, on the PNG's pixels; `None` if [`Params::exr`] is false.
     pub exr: Option<Vec<u8>>,
     /// The tree in space from the global view as PNG, in the same colours.
@@ -100,7 +109,7 @@ pub struct Rendered {
 ///
 /// # Errors
 /// [`Error`] if a parameter is out of range, the embedding is another tree's, a number cannot be drawn, or the
-/// picture would be over 2²⁵ pixels.
+/// picture would be over 2²⁷ pixels.
 pub fn render(
     tree: &Tree,
     embedding: &Embedding,
@@ -109,20 +118,23 @@ pub fn render(
 ) -> Result<Rendered, Error> {
     params.validate()?;
     check_entries(tree, embedding)?;
+    let branches = tree.branches();
+    let scene = Scene::planar(tree, embedding, params.width_scale)?;
+    // The losses do not depend on how the whole is turned.
+    let orientation = Orientation::of(tree, &scene);
     let artist = Artist {
         tree,
-        branches: &tree.branches(),
-        coloring: &coloring::color(tree, &tree.branches(), embedding, params),
+        branches: &branches,
+        coloring: &coloring::color((tree, &branches), embedding, &orientation, params),
         params,
         face: Face::built_in()?,
         colors: PageColors::of(params.theme),
     };
 
-    let map = artist.sheet(
-        Scene::planar(tree, embedding, params.width_scale)?,
-        heading::planar(tree, artist.branches, embedding, params),
-        Depth::Flat,
-    )?;
+    let said = heading::planar((tree, &branches), embedding, &orientation, params);
+    let scene = artist.turned(scene, &said)?;
+    let axes = Orientation::of(tree, &scene).axes;
+    let map = artist.sheet(scene, said, Depth::Flat { axes })?;
     let view = &views.global;
     let global = artist.sheet(
         Scene::seen(tree, view, params.width_scale)?,
@@ -130,6 +142,15 @@ pub fn render(
         Depth::Spatial { axes: [view.up.cross(view.towards_camera), view.up] },
     )?;
 
+    let layers = params.exr.then(|| {
+        Layers::new((tree, artist.branches), embedding, &orientation, (&map.page, map.scene.turn_deg))
+    });
+    let drawing = artist.draw(&map, |_, pixels| {
+        let blocks = layers.as_ref().map(|layers| layers.blocks(pixels)).unwrap_or_default();
+        (pixels.iter().filter(|pixel| pixel.is_covered()).count(), blocks)
+    })?;
+    let n_covered = drawing.seen.iter().map(|(n_covered, _)| n_covered).sum();
+    let blocks = drawing.seen.into_iter().flat_map(|(_, blocks)| blocks).collect();
     let title = params.title.as_deref().unwrap_or("planar map of a tree");
     let content = svg::Content {
         tree,
@@ -139,21 +160,17 @@ pub fn render(
         title,
         prefix: "",
     };
-    // Each PNG is packed by one thread, so the pictures are made side by side.
-    let draw_map = || {
-        let pixels = artist.draw(&map);
-        let layers = || layers::Layers::new(tree, artist.branches, embedding, (&map.page, &pixels)).encode();
-        let (png, exr) = rayon::join(|| artist.png(&map, &pixels), || params.exr.then(layers).transpose());
-        (png, exr, report(tree, [&map, &global], &pixels))
-    };
-    let draw_global = || artist.png(&global, &artist.draw(&global));
-    let ((png, exr, report), global_view_png) = rayon::join(draw_map, draw_global);
+    let pdf = drawing.stream.map(|stream| {
+        let drawn = pdf::Drawn::of(&content, &map.page, &artist.colors, stream);
+        pdf::pdf(&map.page, (drawn, &map.groups), (artist.colors.background, &artist.face), title)
+    });
     Ok(Rendered {
-        png: png?,
+        png: drawing.png,
         svg: svg::svg(&content, &map.page, &map.groups, &artist.colors),
-        exr: exr?,
-        global_view_png: global_view_png?,
-        report,
+        pdf: pdf.transpose()?,
+        exr: layers.as_ref().map(|layers| layers.file(blocks)).transpose()?,
+        global_view_png: artist.draw(&global, |_, _| ())?.png,
+        report: report(tree, [&map, &global], n_covered),
     })
 }
 
@@ -164,11 +181,20 @@ const MAX_LAYERS: f64 = 4.0;
 /// Whether edges can pass in front of each other.
 #[derive(Clone, Copy)]
 enum Depth {
-    Flat,
-    /// Seen along a direction; what points to the right and up names the letters at the edges.
-    Spatial {
-        axes: [DVec3; 2],
-    },
+    /// Never; what points to the right and up on the whole, if the tree tells.
+    Flat { axes: Option<[DVec3; 2]> },
+    /// Seen along a direction; what points to the right and up.
+    Spatial { axes: [DVec3; 2] },
+}
+
+impl Depth {
+    /// What names the letters at the edges.
+    fn axes(self) -> Option<[DVec3; 2]> {
+        match self {
+            Self::Flat { axes } => axes,
+            Self::Spatial { axes } => Some(axes),
+        }
+    }
 }
 
 /// All that makes a picture but its pixels.
@@ -183,6 +209,15 @@ struct Sheet {
     too_thick: Option<f64>,
 }
 
+/// A picture, drawn.
+struct Drawing<T> {
+    png: Vec<u8>,
+    /// The tree without the marks, packed, for a flat pseudo-surface in a PDF.
+    stream: Option<Vec<u8>>,
+    /// What was made of each band.
+    seen: Vec<T>,
+}
+
 /// What the map and the global view have in common.
 struct Artist<'a> {
     tree: &'a Tree,
@@ -194,6 +229,28 @@ struct Artist<'a> {
 }
 
 impl Artist<'_> {
+    /// The map, turned to fit its page if that is wanted.
+    fn turned(&self, scene: Scene, said: &Heading) -> Result<Scene, Error> {
+        if self.params.fit == Fit::Upright {
+            return Ok(scene);
+        }
+        let (_, heading_px) = furniture::heading(&self.face, said, self.params.width_px, &self.colors);
+        let pen = Pen { min_width_px: self.params.min_width_px, style: self.params.style };
+        let needs = self.needs(heading_px, true, self.params.aspect);
+        Ok(scene.turned(Page::best_turn(&scene, (self.params.width_px, pen), &needs)?))
+    }
+
+    /// The room that marks need; `has_letters` at the edges.
+    fn needs(&self, heading_px: f64, has_letters: bool, aspect: Option<f64>) -> Needs {
+        let width = self.params.width_px;
+        Needs {
+            heading_px,
+            key_px: furniture::key_size(&self.face, self.coloring, width),
+            rim_px: Page::unit_px(width) * if has_letters { 4.2 } else { 2.2 },
+            aspect,
+        }
+    }
+
     /// The sheet in the style asked for; as lines of a tree without radii if those cover the picture too often.
     fn sheet(&self, scene: Scene, said: Heading, depth: Depth) -> Result<Sheet, Error> {
         let true_to_width = self.sheet_as(self.params.style, scene, &said, depth)?;
@@ -204,8 +261,7 @@ impl Artist<'_> {
     }
 
     fn sheet_as(&self, style: Style, scene: Scene, said: &Heading, depth: Depth) -> Result<Sheet, Error> {
-        let axes = if let Depth::Spatial { axes } = depth { Some(axes) } else { None };
-        let (page, groups) = self.lay_out(&scene, said, (style, axes))?;
+        let (page, groups) = self.lay_out(&scene, said, (style, depth))?;
         let kinship = Kinship::new(self.tree, self.branches, &scene, page.px_per_mm);
         let sketched = |style| {
             let page = Page { pen: Pen { style, ..page.pen }, ..page };
@@ -214,49 +270,66 @@ impl Artist<'_> {
         // Lines too are laid out with room for the radii, which leaves none for the lines.
         let surface = sketched(Style::PseudoSurface);
         let n_layers = raster::layers([page.width as usize, page.height as usize], &surface);
-        let drawn = if style == Style::PseudoSurface { surface } else { sketched(style) };
+        let drawn = if style == Style::Line { sketched(style) } else { surface };
         let too_thick = (n_layers > MAX_LAYERS).then_some(n_layers);
-        Ok(Sheet { scene, page, groups, kinship, drawn, has_depth: axes.is_some(), too_thick })
+        let has_depth = matches!(depth, Depth::Spatial { .. });
+        Ok(Sheet { scene, page, groups, kinship, drawn, has_depth, too_thick })
     }
 
-    /// The page of a scene and all its marks; with letters at the edges if `axes` (right, up) are given.
+    /// The page of a scene and all its marks.
     fn lay_out(
         &self,
         scene: &Scene,
         said: &Heading,
-        (style, axes): (Style, Option<[DVec3; 2]>),
+        (style, depth): (Style, Depth),
     ) -> Result<(Page, Vec<drawing::Group>), Error> {
         let Self { tree, coloring, params, face, colors, .. } = self;
         let (heading, heading_px) = furniture::heading(face, said, params.width_px, colors);
-        let unit_px = Page::unit_px(params.width_px);
-        let needs = Needs {
-            heading_px,
-            key_px: furniture::key_size(face, coloring, params.width_px),
-            rim_px: unit_px * if axes.is_some() { 4.2 } else { 2.2 },
-        };
+        // Thumbnails have no room for letters on a map, whose marks say little without the heading.
+        let axes = depth.axes().filter(|_| {
+            let is_map = matches!(depth, Depth::Flat { .. });
+            params.compass != Compass::None && !(is_map && Page::is_thumbnail(params.width_px))
+        });
+        let aspect = params.aspect.filter(|_| matches!(depth, Depth::Flat { .. }));
+        let needs = self.needs(heading_px, axes.is_some(), aspect);
         let pen = Pen { min_width_px: params.min_width_px, style };
         let page = Page::lay_out(tree, scene, (params.width_px, pen), &needs)?;
         let mut groups = vec![heading];
         groups.extend(furniture::key(&page, coloring, params, colors));
         groups.push(furniture::root_mark(&page, tree, scene, colors));
         groups.extend(axes.and_then(|axes| furniture::compass(&page, axes, params.compass, colors)));
+        if let (Depth::Flat { .. }, Some(axes)) = (depth, axes) {
+            let map = letters::Map { tree, branches: self.branches, scene, page: &page, axes };
+            let taken: Vec<_> =
+                groups.iter().flat_map(|group| &group.marks).map(|mark| mark.bounds(face)).collect();
+            groups.push(letters::at_branches(&map, (face, colors), params.compass, &taken));
+        }
         Ok((page, groups))
     }
 
-    fn draw(&self, sheet: &Sheet) -> Vec<Pixel> {
-        raster::rasterise(&Job {
-            size: [sheet.page.width as usize, sheet.page.height as usize],
+    /// The picture, and what `look` makes of each band of its pixels, of which it is told the first row.
+    fn draw<T: Send>(
+        &self,
+        sheet: &Sheet,
+        look: impl Fn(usize, &[Pixel]) -> T + Sync,
+    ) -> Result<Drawing<T>, Error> {
+        let Page { width, height, pen, .. } = sheet.page;
+        let raster = Raster::new(Job {
+            size: [width as usize, height as usize],
             drawn: &sheet.drawn,
             kinship: &sheet.kinship,
             palette: &self.coloring.palette,
             colors: self.colors,
-            style: sheet.page.pen.style,
+            style: pen.style,
             has_depth: sheet.has_depth,
-        })
-    }
-
-    fn png(&self, sheet: &Sheet, pixels: &[Pixel]) -> Result<Vec<u8>, Error> {
-        paint::png(&sheet.page, pixels, &sheet.groups, (self.colors.background, &self.face))
+        });
+        let mut canvas = Canvas::new([width, height], self.colors.background)?;
+        let seen = canvas.surface(&raster, [0, 0], look);
+        let is_lit = pen.style == Style::PseudoSurface;
+        let stream =
+            (self.params.pdf && !sheet.has_depth).then(|| if is_lit { canvas.stream() } else { Vec::new() });
+        canvas.mark(&sheet.groups, &self.face);
+        Ok(Drawing { png: canvas.png(), stream, seen })
     }
 }
 
@@ -275,7 +348,7 @@ fn check_entries(tree: &Tree, embedding: &Embedding) -> Result<(), Error> {
     Ok(())
 }
 
-fn report(tree: &Tree, [map, global]: [&Sheet; 2], pixels: &[Pixel]) -> Report {
+fn report(tree: &Tree, [map, global]: [&Sheet; 2], n_covered: usize) -> Report {
     let Sheet { scene, page, .. } = map;
     let mut report = Report::default();
     report.count("width_px", page.width);
@@ -285,8 +358,8 @@ fn report(tree: &Tree, [map, global]: [&Sheet; 2], pixels: &[Pixel]) -> Report {
         |&(node, _): &(usize, usize)| scene.radii_mm[node] * page.px_per_mm < 0.5 * page.pen.min_width_px;
     report.count_usize("edges", tree.n_nodes() - 1);
     report.count_usize("edges_at_least_width", tree.edges().filter(is_thin).count());
-    let n_covered = pixels.iter().filter(|pixel| pixel.is_covered()).count();
-    report.count("covered_percent", 100.0 * n_covered as f64 / pixels.len().max(1) as f64);
+    let n_pixels = f64::from(page.width) * f64::from(page.height);
+    report.count("covered_percent", 100.0 * n_covered as f64 / n_pixels.max(1.0));
     for (sheet, name) in [(map, "map"), (global, "global view")] {
         if let Some(n_layers) = sheet.too_thick {
             report.warn(

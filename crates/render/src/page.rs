@@ -13,8 +13,8 @@ use crate::Error;
 use crate::params::Style;
 use crate::scene::Scene;
 
-/// How many pixels a picture may have: at 32 bytes each, a gigabyte.
-pub(crate) const MAX_PIXELS: u64 = 1 << 25;
+/// How many pixels a picture may have: at 4 bytes each, half a gigabyte.
+pub(crate) const MAX_PIXELS: u64 = 1 << 27;
 /// Bounds of height over width of the tree's area.
 const ASPECT: [f64; 2] = [0.42, 1.35];
 /// The least layout unit in pixels: small text is then 7 pixels high.
@@ -33,6 +33,8 @@ pub(crate) struct Needs {
     pub key_px: DVec2,
     /// Room around the tree for marks at its edges.
     pub rim_px: f64,
+    /// Height of the page over its width; if nobody says, the tree's shape does.
+    pub aspect: Option<f64>,
 }
 
 /// A page in pixels.
@@ -107,8 +109,11 @@ impl Page {
         // The room for the tree itself, inside the rim and half a line all round.
         let rim = needs.rim_px + 0.5 * pen.min_width_px;
         let room_x = (f64::from(width) - 2.0 * margin - column_px - 2.0 * rim).max(unit_px);
-        let aspect = (size_mm.y / size_mm.x).clamp(ASPECT[0], ASPECT[1]);
-        let room = DVec2::new(room_x, (room_x * aspect).max(needs.key_px.y));
+        let room_y = match needs.aspect {
+            Some(aspect) => f64::from(width) * aspect - 2.0 * (margin + rim) - needs.heading_px,
+            None => room_x * (size_mm.y / size_mm.x).clamp(ASPECT[0], ASPECT[1]),
+        };
+        let room = DVec2::new(room_x, room_y.max(needs.key_px.y).max(unit_px));
         let px_per_mm = (room / size_mm).min_element();
 
         let area_low = DVec2::new(margin, margin + needs.heading_px);
@@ -124,6 +129,22 @@ impl Page {
         Ok(Self { width, height, unit_px, px_per_mm, origin_px, area, key_at, pen })
     }
 
+    /// The turn in whole degrees, counter-clockwise, with which a scene fills its page best: that draws it largest
+    /// where the page's shape is given, else largest for the area of its page. The smallest of equals.
+    pub(crate) fn best_turn(scene: &Scene, (width, pen): (u32, Pen), needs: &Needs) -> Result<u32, Error> {
+        let mut best = (0, 0.0);
+        for turn_deg in 0..360 {
+            let page = Self::fit(&scene.turned(turn_deg), (width, pen), needs, 0.0)?;
+            let size = if needs.aspect.is_some() { 1.0 } else { f64::from(page.height) };
+            let fill = page.px_per_mm * page.px_per_mm / size;
+            // Half a turn away the box is the same but for rounding.
+            if fill > best.1 * (1.0 + 1e-6) {
+                best = (turn_deg, fill);
+            }
+        }
+        Ok(best.0)
+    }
+
     /// The pixel of a scene point.
     pub(crate) fn px(&self, point_mm: DVec2) -> DVec2 {
         self.origin_px + self.px_per_mm * DVec2::new(point_mm.x, -point_mm.y)
@@ -133,7 +154,7 @@ impl Page {
     pub(crate) fn radius_px(&self, radius_mm: f64) -> f64 {
         let least = 0.5 * self.pen.min_width_px;
         match self.pen.style {
-            Style::PseudoSurface => (radius_mm * self.px_per_mm).max(least),
+            Style::PseudoSurface | Style::Ribbon => (radius_mm * self.px_per_mm).max(least),
             Style::Line => least,
         }
     }

@@ -1,56 +1,95 @@
-//! The picture as PNG: the raster on its paper, the marks over it.
+//! The picture as bytes: the raster on its paper, the marks over it.
+//!
+//! **Input** rasters and marks. **Output** RGBA pixels, packed as PNG.
+//! **Guarantees** the same bytes for any number of threads: bands are drawn in parallel into rows of their own.
+//! **Cost** 4 bytes a pixel.
 
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
+use rayon::prelude::*;
 use tiny_skia::{
-    FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, PixmapMut, PremultipliedColorU8, Rect,
-    Stroke, Transform,
+    FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, PixmapMut, Rect, Stroke, Transform,
 };
 
-use crate::Error;
 use crate::drawing::{Group, Mark};
-use crate::page::Page;
+use crate::page::MAX_PIXELS;
 use crate::palette::{Rgb, to_byte};
-use crate::raster::Pixel;
-use crate::shade::mix;
+use crate::raster::{Brush, Pixel, Raster, TILE};
 use crate::text::Face;
+use crate::{Error, png};
 
 /// How much bolder strong text is, as a share of its size.
-const STRONG: f32 = 0.045;
+pub(crate) const STRONG: f32 = 0.045;
 /// Ordinary text is a light face; a hair more weight makes it as dark as the lines.
-const PLAIN: f32 = 0.012;
+pub(crate) const PLAIN: f32 = 0.012;
 
-/// Paints the page.
-pub(crate) fn png(
-    page: &Page,
-    pixels: &[Pixel],
-    groups: &[Group],
-    (background, face): (Rgb, &Face),
-) -> Result<Vec<u8>, Error> {
-    let (width, height) = (page.width, page.height);
-    let too_large = || Error::TooLarge { width, height, limit: crate::page::MAX_PIXELS };
-    let mut pixmap = Pixmap::new(width, height).ok_or_else(too_large)?;
-    for (target, pixel) in pixmap.pixels_mut().iter_mut().zip(pixels) {
-        let color = pixel.color.map(|part| f32::from(part) / 255.0);
-        let [r, g, b] = mix(background, color, pixel.coverage).map(to_byte);
-        *target = PremultipliedColorU8::from_rgba(r, g, b, 255).unwrap_or(PremultipliedColorU8::TRANSPARENT);
-    }
-    for mark in groups.iter().flat_map(|group| &group.marks) {
-        draw(&mut pixmap.as_mut(), mark, face);
-    }
-    encode(&pixmap)
+/// A picture in the making.
+pub(crate) struct Canvas {
+    pixmap: Pixmap,
 }
 
-fn encode(pixmap: &Pixmap) -> Result<Vec<u8>, Error> {
-    let opaque: Vec<u8> = pixmap.pixels().iter().flat_map(|p| [p.red(), p.green(), p.blue()]).collect();
-    let mut bytes = Vec::new();
-    PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive).write_image(
-        &opaque,
-        pixmap.width(),
-        pixmap.height(),
-        ExtendedColorType::Rgb8,
-    )?;
-    Ok(bytes)
+impl Canvas {
+    /// Blank paper.
+    pub(crate) fn new([width, height]: [u32; 2], background: Rgb) -> Result<Self, Error> {
+        let too_large = || Error::TooLarge { width, height, limit: MAX_PIXELS };
+        if u64::from(width) * u64::from(height) > MAX_PIXELS {
+            return Err(too_large());
+        }
+        let mut pixmap = Pixmap::new(width, height).ok_or_else(too_large)?;
+        let [r, g, b] = background.map(to_byte);
+        pixmap.fill(tiny_skia::Color::from_rgba8(r, g, b, 255));
+        Ok(Self { pixmap })
+    }
+
+    /// Draws a raster with its upper left corner at a pixel. Gives what `look` makes of each band, from the top; it
+    /// is told the band's first row.
+    pub(crate) fn surface<T: Send>(
+        &mut self,
+        raster: &Raster<'_>,
+        [left, top]: [usize; 2],
+        look: impl Fn(usize, &[Pixel]) -> T + Sync,
+    ) -> Vec<T> {
+        let stride = 4 * self.pixmap.width() as usize;
+        let width = raster.size()[0];
+        let rows = self.pixmap.data_mut().get_mut(top * stride..).unwrap_or_default();
+        let bands = rows.par_chunks_mut(stride * TILE).take(raster.n_bands()).enumerate();
+        let draw = |brush: &mut Brush, (band, rows): (usize, &mut [u8])| {
+            let pixels = raster.band(band, brush);
+            for (line, row) in pixels.chunks(width).zip(rows.chunks_mut(stride)) {
+                for (pixel, target) in line.iter().zip(row.chunks_exact_mut(4).skip(left)) {
+                    put(pixel, target);
+                }
+            }
+            look(band * TILE, &pixels)
+        };
+        bands.map_init(Brush::new, draw).collect()
+    }
+
+    /// Draws marks over everything.
+    pub(crate) fn mark(&mut self, groups: &[Group], face: &Face) {
+        for mark in groups.iter().flat_map(|group| &group.marks) {
+            draw(&mut self.pixmap.as_mut(), mark, face);
+        }
+    }
+
+    /// The rows as the zlib stream of a PNG.
+    pub(crate) fn stream(&self) -> Vec<u8> {
+        png::stream(self.pixmap.data(), self.pixmap.width(), self.pixmap.height()).concat()
+    }
+
+    /// The picture as PNG.
+    pub(crate) fn png(&self) -> Vec<u8> {
+        png::encode(self.pixmap.data(), self.pixmap.width(), self.pixmap.height())
+    }
+}
+
+/// Lays a pixel over an opaque one.
+fn put(pixel: &Pixel, target: &mut [u8]) {
+    if !pixel.is_covered() {
+        return;
+    }
+    for (part, below) in pixel.color.iter().zip(target) {
+        let (over, under) = (f32::from(*part) / 255.0, f32::from(*below) / 255.0);
+        *below = to_byte(under + pixel.coverage * (over - under));
+    }
 }
 
 fn draw(target: &mut PixmapMut<'_>, mark: &Mark, face: &Face) {

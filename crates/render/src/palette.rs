@@ -93,6 +93,11 @@ impl Palette {
         Self { table: NAMES.map(rgb).to_vec(), is_continuous: false }
     }
 
+    /// The first `n` colours, at least one; from the first again where there are fewer.
+    pub(crate) fn first(&self, n: usize) -> Self {
+        Self { table: self.table.iter().copied().cycle().take(n.max(1)).collect(), is_continuous: false }
+    }
+
     /// Grey for what all parts have in common, then unordered colours for the parts.
     pub(crate) fn parts(theme: Theme) -> Self {
         let grey = if theme == Theme::Dark { 0xb4_b8c0 } else { 0x8a_8f98 };
@@ -154,6 +159,8 @@ pub(crate) struct PageColors {
     pub rim: Rgb,
     /// What must not be overlooked, such as a crossing.
     pub alarm: Rgb,
+    /// How dark the outline of branches is, 0 to 1.
+    pub outline: f32,
 }
 
 impl PageColors {
@@ -166,6 +173,15 @@ impl PageColors {
                 soft: rgb(0x5a_5f68),
                 rim: rgb(0x2b_2a33),
                 alarm: rgb(0xd0_021b),
+                outline: 0.5,
+            },
+            Theme::Print => Self {
+                background: rgb(0xff_ffff),
+                ink: rgb(0x00_0000),
+                soft: rgb(0x3c_3c3c),
+                rim: rgb(0x12_1212),
+                alarm: rgb(0xc0_0000),
+                outline: 0.85,
             },
             Theme::Dark => Self {
                 background: rgb(0x11_1317),
@@ -173,6 +189,7 @@ impl PageColors {
                 soft: rgb(0xa7_acb5),
                 rim: rgb(0x08_090b),
                 alarm: rgb(0xff_4d4d),
+                outline: 0.5,
             },
         }
     }

@@ -10,6 +10,8 @@ pub enum Style {
     /// Lit round cones between the radii of the nodes (section 4.1 of [Hu2022]).
     #[default]
     PseudoSurface,
+    /// Flat bands of the true width, for print in few colours and for labels over them.
+    Ribbon,
     /// The bare skeleton as lines of one width.
     Line,
 }
@@ -18,11 +20,13 @@ pub enum Style {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Theme {
-    /// Dark ink on white, for paper.
+    /// Dark ink on white, for screens and paper.
     #[default]
     Light,
     /// Light ink on near-black, for a reading room and slides.
     Dark,
+    /// Black ink and stronger outlines, for journals and grey printers.
+    Print,
 }
 
 /// What the colours mean.
@@ -42,6 +46,24 @@ pub enum ColorBy {
     AngleLoss,
     /// By what share the length of the edge differs from its target.
     LengthLoss,
+    /// By how many degrees the edge runs otherwise in space than the map's letters say.
+    OrientationLoss,
+    /// The main subtrees, each in a colour of its own, as in the comparison of methods.
+    Part,
+    /// The label of each node: the structure of a traced tree (soma, axon, dendrite, …); one colour where a tree has
+    /// none.
+    Label,
+}
+
+/// How the tree lies on its page.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Fit {
+    /// As the embedding has it: as seen in the patient, or with the root on top.
+    #[default]
+    Upright,
+    /// Turned as a whole, in whole degrees, so that it fills the page best. Letters turn along.
+    Turned,
 }
 
 /// The unit of the scale bar and of the radii.
@@ -63,7 +85,7 @@ pub enum Unit {
     Nm,
 }
 
-/// The letters at the edges of the global view.
+/// The letters at the edges of the map and of the global view, and at branches that run otherwise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Compass {
@@ -103,8 +125,16 @@ pub struct Params {
     pub min_width_px: f64,
     /// Unit of the scale bar and of the radii. Default automatic.
     pub unit: Unit,
-    /// Letters at the edges of the global view. Default auto: anatomical for a scan, axes for a traced tree.
+    /// Letters at the edges of map and global view. Default auto: anatomical for a scan, axes for a traced tree. On a
+    /// map they say where most of the tree's length runs; long branches that run otherwise have their own.
     pub compass: Compass,
+    /// How the map lies on its page. Default upright.
+    pub fit: Fit,
+    /// Height of the map's page over its width, 0.2 to 5, such as 0.5625 for a slide or 1.414 for a sheet of paper.
+    /// None by default: the page takes the tree's shape within 0.4 to 1.4.
+    pub aspect: Option<f64>,
+    /// Whether to make the PDF, 300 pixels to an inch. Default true.
+    pub pdf: bool,
     /// Whether to make the EXR with its layers. Default true; it is the largest of the files.
     pub exr: bool,
 }
@@ -121,6 +151,9 @@ impl Default for Params {
             min_width_px: 2.0,
             unit: Unit::Auto,
             compass: Compass::Auto,
+            fit: Fit::Upright,
+            aspect: None,
+            pdf: true,
             exr: true,
         }
     }
@@ -153,6 +186,11 @@ impl Params {
             "min_width_px",
             (0.5..=100.0).contains(&min_width_px),
             format!("must be 0.5 to 100 pixels, is {min_width_px}"),
+        )?;
+        ParamError::check(
+            "aspect",
+            self.aspect.is_none_or(|aspect| (0.2..=5.0).contains(&aspect)),
+            format!("must be 0.2 to 5, is {}", self.aspect.unwrap_or_default()),
         )?;
         let title_chars = self.title.as_ref().map_or(0, |title| title.chars().count());
         ParamError::check(

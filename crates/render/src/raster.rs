@@ -1,19 +1,18 @@
 //! The tree as pixels: round cones, the highest in front, smooth where branches join.
 //!
 //! **Input** a scene on its page, values in [0, 1] at the ends of each edge. **Output** for each pixel the colour,
-//! the share covered, and what is seen there: edge, place on it, height, normal.
-//! **Notation** S samples per pixel and axis, E edges.
-//! **Steps** 1. Sort the cones into tiles. In each tile: 2. find the highest cone above each sample and the
-//! distance to the outline of all. 3. Where several cones of one neighbourhood of the tree reach nearly as high,
-//! average their normals and colours with weights that fade to 0 with the gap in height: creases between
-//! neighbours become fillets, and a chain of collinear cones stays as it is. 4. Where a cone in front passes over
-//! a distant part of the tree, leave a gap in the paper's colour, as anatomical drawings do; where distant parts of
-//! the map touch, draw a seam. 5. Shade, and average the samples by their coverage.
-//! **Guarantees** the same bytes for any number of threads: a band of tiles is one task, and inside a tile cones
-//! come in preorder.
-//! **Source** section 4.1 of [Hu2022]; the blending is ours.
-//! **Cost** O(S² · sum of the cones' areas + E) time, S = 1 where a tile is crowded or
-//! inside of one broad cone; 32 bytes a pixel. [`layers`] tells that sum beforehand.
+//! the share covered, and what is seen there: edge, place on it, height, normal; in bands of [`TILE`] rows, so that
+//! nobody needs to hold a whole picture of them.
+//! **Notation** E edges.
+//! **Steps** 1. Sort the cones into tiles. In each tile: 2. draw one sample a pixel (see [`crate::samples`]), three by
+//! three where a cone is as thin as a few pixels. 3. Where neighbouring pixels show distant parts of the tree, draw
+//! the pixel again with nine samples: outlines against the paper need none, since coverage follows from their
+//! distance. 4. Shade, and average the samples by their coverage.
+//! **Guarantees** the same bytes for any number of threads: a band is one task, and inside a tile cones come in
+//! preorder. A pixel is drawn the same way in whichever tile it lies: tiles look one pixel over their borders.
+//! **Source** section 4.1 of [Hu2022].
+//! **Cost** O(sum of the cones' areas + E) time; 36 bytes a pixel of the bands in work. [`layers`] tells that sum
+//! beforehand.
 
 use std::ops::RangeInclusive;
 
@@ -22,16 +21,25 @@ use rayon::prelude::*;
 
 use crate::cone::Cone;
 use crate::kinship::Kinship;
-use crate::palette::{PageColors, Palette};
+use crate::palette::{PageColors, Palette, to_byte};
 use crate::params::Style;
-use crate::samples::{Detail, GAP_PX, Samples};
+use crate::samples::{Best, GAP_PX, Lattice, Samples};
+use crate::shade::{self, Place};
 
-/// Samples per pixel and axis; odd, so that one sample is the pixel's centre.
-pub(crate) const SAMPLES: usize = 3;
 /// Pixels per tile and axis.
 pub(crate) const TILE: usize = 32;
-/// The most samples per tile and axis.
-pub(crate) const TILE_SAMPLES: usize = TILE * SAMPLES;
+/// Samples per pixel and axis where one is not enough; odd, so that one sample is the pixel's centre.
+const FINE: usize = 3;
+/// A cone as thin as this turns from light to shade within a pixel.
+const THIN_PX: f32 = 2.0;
+/// Tiles that cones cover more often than this get one sample a pixel. Organs at their true widths stay below: no
+/// pixel of the airway, vessel and neuron phantoms' pictures changes by it.
+const FINE_LAYERS: f64 = 12.0;
+/// Neighbouring pixels whose heights differ by more than this share of the radius show an edge of one part before
+/// another, even of the same neighbourhood.
+const STEP: f32 = 0.5;
+/// Places farther apart along the tree than this, in their radii, are distant parts.
+const DISTANT: f32 = 4.0;
 /// Beyond this mean over the tiles that are not empty nobody can see what blends with what.
 const PLAIN_LAYERS: f64 = 16.0;
 /// What an edge of a few pixels may take, in pixels, without being counted: however many they are, they must be drawn.
@@ -52,14 +60,23 @@ pub(crate) struct Pixel {
     pub height_px: f32,
     /// Unit normal: x right, y down, z to the viewer.
     pub normal: [f32; 3],
+    /// How far to the left of the edge, seen from the parent, in pixels; under 0 to the right.
+    pub across_px: f32,
     /// Colour, sRGB.
     pub color: [u8; 3],
 }
 
 impl Pixel {
     /// Background.
-    pub(crate) const EMPTY: Self =
-        Self { coverage: 0.0, node: NOTHING, share: 0.0, height_px: 0.0, normal: [0.0; 3], color: [0; 3] };
+    pub(crate) const EMPTY: Self = Self {
+        coverage: 0.0,
+        node: NOTHING,
+        share: 0.0,
+        height_px: 0.0,
+        normal: [0.0; 3],
+        across_px: 0.0,
+        color: [0; 3],
+    };
 
     /// Whether the tree touches the pixel.
     pub(crate) fn is_covered(&self) -> bool {
@@ -116,42 +133,159 @@ pub(crate) fn layers(size: [usize; 2], drawn: &[Drawn]) -> f64 {
 /// The tiles that an edge touches: columns and rows.
 fn tiles_of(size: [usize; 2], edge: &Drawn) -> [RangeInclusive<usize>; 2] {
     let (low, high) = edge.cone.bounds();
+    let reach = edge.cone.fillet_px().max(GAP_PX) + 1.0;
     // Casts saturate, so what lies off the page ends on its border.
     let range = |low: f32, high: f32, n_pixels: usize| {
         let tile = |at: f32| ((at / TILE as f32) as usize).min(n_pixels.div_ceil(TILE) - 1);
-        tile(low - GAP_PX - 1.0)..=tile(high + GAP_PX + 1.0)
+        tile(low - reach - 1.0)..=tile(high + reach + 1.0)
     };
     [range(low.x, high.x, size[0]), range(low.y, high.y, size[1])]
 }
 
-/// Draws the edges.
-pub(crate) fn rasterise(job: &Job<'_>) -> Vec<Pixel> {
-    let [width, height] = job.size;
-    let tiles = Tiles::sort(job);
-    let n_layers = tiles.layers(job);
-    let is_plain = is_plain(&n_layers);
-    let mut pixels = vec![Pixel::EMPTY; width * height];
-    pixels.par_chunks_mut(width * TILE).enumerate().for_each(|(tile_y, band)| {
-        let mut samples = Samples::new();
-        for tile_x in 0..tiles.n_x {
-            let list = tiles.list(tile_x, tile_y);
-            if list.is_empty() {
-                continue;
+/// A picture, ready to be drawn band by band.
+pub(crate) struct Raster<'a> {
+    job: Job<'a>,
+    tiles: Tiles,
+    n_layers: Vec<f64>,
+    is_plain: bool,
+}
+
+/// What a thread draws with.
+pub(crate) struct Brush {
+    tile: Samples,
+    pixel: Samples,
+}
+
+impl Brush {
+    pub(crate) fn new() -> Self {
+        Self { tile: Samples::new(), pixel: Samples::new() }
+    }
+}
+
+impl<'a> Raster<'a> {
+    /// Sorts the cones.
+    pub(crate) fn new(job: Job<'a>) -> Self {
+        let tiles = Tiles::sort(&job);
+        let n_layers = tiles.layers(&job);
+        let is_plain = is_plain(&n_layers);
+        Self { job, tiles, n_layers, is_plain }
+    }
+
+    /// Width and height in pixels.
+    pub(crate) fn size(&self) -> [usize; 2] {
+        self.job.size
+    }
+
+    /// How many bands there are.
+    pub(crate) fn n_bands(&self) -> usize {
+        self.job.size[1].div_ceil(TILE)
+    }
+
+    /// The pixels of the band of this index, [`TILE`] rows or what is left.
+    pub(crate) fn band(&self, band: usize, brush: &mut Brush) -> Vec<Pixel> {
+        let [width, height] = self.job.size;
+        let n_rows = height.saturating_sub(band * TILE).min(TILE);
+        let mut pixels = vec![Pixel::EMPTY; width * n_rows];
+        for column in 0..self.tiles.n_x {
+            let list = self.tiles.list(column, band);
+            if !list.is_empty() {
+                self.tile([column, band], list, (brush, &mut pixels));
             }
-            let origin = Vec2::new((tile_x * TILE) as f32, (tile_y * TILE) as f32);
-            let n_layers = n_layers[tile_y * tiles.n_x + tile_x];
-            let is_one_body = matches!(list, [only] if job.drawn[*only as usize].cone.is_broad());
-            let detail = Detail::of_tile(n_layers, is_one_body, is_plain);
-            samples.draw(job, list, origin, detail);
-            let columns = tile_x * TILE..((tile_x + 1) * TILE).min(width);
-            for (row, line) in band.chunks_mut(width).enumerate() {
-                for (column, pixel) in line[columns.clone()].iter_mut().enumerate() {
-                    *pixel = samples.resolve(job, column, row);
+        }
+        pixels
+    }
+
+    /// Draws one tile into its band.
+    fn tile(&self, [column, band]: [usize; 2], list: &[u32], (brush, pixels): (&mut Brush, &mut [Pixel])) {
+        let (job, width) = (&self.job, self.job.size[0]);
+        let is_thin = |&index: &u32| job.drawn[index as usize].cone.least_radius() < THIN_PX;
+        let is_crowded = self.n_layers[band * self.tiles.n_x + column] > FINE_LAYERS;
+        let n = if !self.is_plain && !is_crowded && list.iter().any(is_thin) { FINE } else { 1 };
+        let corner = Vec2::new((column * TILE) as f32, (band * TILE) as f32);
+        // One sample a pixel looks over the border, to compare neighbours.
+        let rim = usize::from(n == 1);
+        let origin = corner - rim as f32;
+        let lattice = Lattice { origin, n_pixels: TILE + 2 * rim, n };
+        brush.tile.draw(job, list, lattice, !self.is_plain);
+        let is_refined = n == 1 && !self.is_plain && !is_crowded;
+        for (row, line) in pixels.chunks_mut(width).enumerate() {
+            for (x, pixel) in line.iter_mut().skip(column * TILE).take(TILE).enumerate() {
+                let at = [x + rim, row + rim];
+                if is_refined && self.has_edge(&brush.tile, at) {
+                    let origin = corner + Vec2::new(x as f32, row as f32);
+                    brush.pixel.draw(job, list, Lattice { origin, n_pixels: 1, n: FINE }, true);
+                    *pixel = resolve(job, &brush.pixel, [0, 0]);
+                } else {
+                    *pixel = resolve(job, &brush.tile, at);
                 }
             }
         }
-    });
-    pixels
+    }
+
+    /// Whether a pixel and one beside it show distant parts of the tree.
+    fn has_edge(&self, tile: &Samples, [x, y]: [usize; 2]) -> bool {
+        let row = tile.lattice.row();
+        let own = &tile.best[y * row + x];
+        if own.index == NOTHING {
+            return false;
+        }
+        let beside = [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)];
+        beside.into_iter().any(|(x, y)| self.are_distant(own, &tile.best[y * row + x]))
+    }
+
+    fn are_distant(&self, a: &Best, b: &Best) -> bool {
+        if a.index == b.index || b.index == NOTHING || a.hit.level.max(b.hit.level) < 0.0 {
+            return false;
+        }
+        let place = |best: &Best| {
+            let edge = &self.job.drawn[best.index as usize];
+            (edge.node, edge.arc_px[0] + best.hit.share * (edge.arc_px[1] - edge.arc_px[0]))
+        };
+        let radius = a.hit.radius.min(b.hit.radius);
+        let limit = DISTANT * (a.hit.radius + b.hit.radius);
+        (a.hit.z - b.hit.z).abs() > STEP * radius + 1.0
+            || self.job.kinship.path_px(place(a), place(b), limit) > limit
+    }
+}
+
+/// The pixel at a column and row of some samples.
+fn resolve(job: &Job<'_>, samples: &Samples, [x, y]: [usize; 2]) -> Pixel {
+    let lattice = samples.lattice;
+    let n = lattice.n;
+    let first = (y * lattice.row() + x) * n;
+    let at = |i: usize| first + (i / n) * lattice.row() + i % n;
+    let (mut color, mut covered) = ([0.0; 3], 0.0);
+    // The centre speaks for the pixel; at the rim, where it is empty, the first sample that is not.
+    let (center, mut speaker) = (at(n * n / 2), None);
+    for sample in (0..n * n).map(at) {
+        let surface = &samples.surface[sample];
+        let coverage = if samples.best[sample].index == NOTHING { 0.0 } else { lattice.coverage(surface) };
+        if coverage <= 0.0 {
+            continue;
+        }
+        if speaker.is_none() || sample == center {
+            speaker = Some(sample);
+        }
+        let place =
+            Place { normal: surface.normal(), outside_px: surface.outside, radius_px: surface.radius };
+        let lit = shade::shade(surface.base(), &place, &job.colors, job.style);
+        let lit = shade::mix(lit, job.colors.rim, shade::SEAM * surface.seam);
+        let lit = shade::mix(lit, job.colors.background, surface.gap);
+        color = std::array::from_fn(|k| color[k] + coverage * lit[k]);
+        covered += coverage;
+    }
+    let Some(speaker) = speaker else { return Pixel::EMPTY };
+    let (best, surface) = (&samples.best[speaker], &samples.surface[speaker]);
+    let edge = &job.drawn[best.index as usize];
+    Pixel {
+        coverage: covered / (n * n) as f32,
+        node: edge.node,
+        share: best.hit.share,
+        height_px: surface.level.max(0.0).sqrt(),
+        normal: surface.normal().to_array(),
+        across_px: edge.cone.across(&best.hit),
+        color: color.map(|part| to_byte(part / covered)),
+    }
 }
 
 /// Whether most of the picture is too crowded for blending: all of it then goes without, for a tile that does not blend

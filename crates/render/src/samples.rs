@@ -1,130 +1,198 @@
-//! The samples of one tile: which cone is highest, and how its neighbours blend with it.
+//! The samples of one tile: which cone is highest, and how others join it.
 //!
-//! **Input** the cones of a tile in preorder. **Output** the tile's pixels.
-//! **Steps** 2 to 5 of [`crate::raster`], in the [`Detail`] that the tile can afford.
-//! **Guarantees** sums run in preorder of the cones, so the bytes do not depend on threads.
+//! **Input** the cones of a tile in preorder. **Output** what is seen at each sample.
+//! **Notation** g level: the square of a cone's height, under 0 outside of it; r its radius; n its normal.
+//! **Steps** 1. The highest cone at each sample (outside of all, the one of the highest level). 2. Cones of the same
+//! branch that come near it share their normals and colours, so that a chain of cones looks like one tube. 3. Of each
+//! other branch the highest cone joins: two levels that differ by less than k become max + (k − |Δg|)²/4k, which
+//! rounds the corner in the outline and the crease in the surface at once. k = 2 κ r₁ √(r₁ r₂) sin(½∠(n₁, n₂)), r₁ ≤ r₂:
+//! where surfaces run on into each other nothing is added. k fades where the path between the two places along the
+//! tree is long. 4. Where a cone in front passes over a distant part, leave a gap; where distant parts touch, draw a
+//! seam.
+//! **Guarantees** branches join in preorder, so the bytes do not depend on threads.
+//! **Source** Joining by the angle of the gradients: [Gourmel2013]; the quadratic smooth maximum is folklore of
+//! implicit modelling. Gaps and seams are ours.
 
 use std::ops::Range;
 
 use glam::{Vec2, Vec3};
 
 use crate::cone::{Cone, Hit};
-use crate::palette::{Rgb, to_byte};
-use crate::raster::{Drawn, Job, NOTHING, Pixel, SAMPLES, TILE, TILE_SAMPLES};
-use crate::shade::{self, Place};
+use crate::palette::Rgb;
+use crate::raster::{Drawn, Job, NOTHING, TILE};
 
-/// Tiles that cones cover more often than this get one sample a pixel. Organs at their true widths stay below: no
-/// pixel of the airway, vessel and neuron phantoms' pictures changes by it.
-const FINE_LAYERS: f64 = 12.0;
-/// Cones that end lower than this share of the radius below the highest have no say in the normal.
-const BLEND_SHARE: f32 = 0.7;
-/// Two cones blend if the path between them is at most this many of their radii.
-const BLEND_REACH: f32 = 2.0;
+/// κ: the size of the fillets, in radii.
+const FILLET: f32 = 0.7;
+/// Two cones join if the path between them is at most this many of their radii; beyond, the fillets get smaller, and
+/// from [`APART`] on they are distant parts.
+const JOINED: f32 = 4.0;
+const APART: f32 = 10.0;
+/// How far a cone's colour reaches into another's, as a share of the square of its radius.
+const COLOR_REACH: f32 = 0.8;
 /// Where two distant parts of the map overlap at their widths, a dark line this wide says that they do not join.
 const SEAM_PX: f32 = 1.3;
-const SEAM: f32 = 0.55;
 /// Width of the gap beside a branch that passes in front.
 pub(crate) const GAP_PX: f32 = 1.6;
+/// Samples per tile and axis at most: three for each pixel.
+const MOST_SAMPLES: usize = 3 * TILE;
 
 /// The best cone at a sample.
-#[derive(Clone, Copy)]
-struct Best {
-    hit: Hit,
-    index: u32,
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Best {
+    /// Where on the cone.
+    pub hit: Hit,
+    /// Which; [`NOTHING`] where none comes near.
+    pub index: u32,
     /// Distance to the outline of all cones.
     outside: f32,
-    /// How many cones reach the sample, or come so near that they may leave a gap beside it.
+    /// How many cones come near.
     n_near: u32,
 }
 
 impl Best {
-    fn nothing() -> Self {
-        Self { hit: Hit::default(), index: NOTHING, outside: f32::INFINITY, n_near: 0 }
-    }
+    const NOTHING: Self = Self { hit: Hit::NOTHING, index: NOTHING, outside: f32::INFINITY, n_near: 0 };
 
-    fn offer(&mut self, index: u32, hit: Hit, fringe_px: f32) {
+    fn offer(&mut self, index: u32, hit: Hit) {
         self.n_near += 1;
-        if hit.outside > fringe_px {
-            return;
-        }
-        if self.index == NOTHING || hit.z > self.hit.z {
+        // Inside goes before outside; there the higher is seen, beyond the outlines the nearer joins first.
+        let rank = |hit: &Hit| if hit.level >= 0.0 { (1, hit.z) } else { (0, hit.level) };
+        if self.index == NOTHING || rank(&hit) > rank(&self.hit) {
             (self.hit, self.index) = (hit, index);
         }
         self.outside = self.outside.min(hit.outside);
     }
 }
 
-/// Sums of the blending.
-#[derive(Clone, Copy)]
-struct Blend {
-    normal: Vec3,
+/// The surface at a sample, of all cones that join there.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Surface {
+    /// The square of its height.
+    pub level: f32,
+    /// The radius.
+    pub radius: f32,
+    /// From the axis to the sample.
+    offset: Vec2,
+    /// What light sees beside the bare shape: a chain of cones turns like one tube.
+    bend: Vec3,
+    /// How many cones of its branch have a say.
+    n_chained: f32,
     color: Rgb,
     weight: f32,
-    gap: f32,
-    seam: f32,
+    /// How much of the paper's colour is seen in the gap beside a branch that passes in front.
+    pub gap: f32,
+    /// How dark a seam is, 0 to 1.
+    pub seam: f32,
+    /// Distance to the outline, under 0 inside.
+    pub outside: f32,
 }
 
-impl Blend {
-    const NOTHING: Self = Self { normal: Vec3::ZERO, color: [0.0; 3], weight: 0.0, gap: 0.0, seam: 0.0 };
+impl Surface {
+    const NOTHING: Self = Self {
+        level: 0.0,
+        radius: 0.0,
+        offset: Vec2::ZERO,
+        bend: Vec3::ZERO,
+        n_chained: 1.0,
+        color: [0.0; 3],
+        weight: 0.0,
+        gap: 0.0,
+        seam: 0.0,
+        outside: f32::INFINITY,
+    };
 
-    fn add(&mut self, job: &Job<'_>, edge: &Drawn, hit: &Hit, weight: f32) {
-        let color = job.palette.at(edge.values[0] + hit.share * (edge.values[1] - edge.values[0]));
-        self.normal += weight * edge.cone.normal(hit);
-        self.color = std::array::from_fn(|k| self.color[k] + weight * color[k]);
-        self.weight += weight;
-    }
-}
-
-/// How carefully a tile is drawn: each layer of cones costs as much as the first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Detail {
-    /// [`SAMPLES`]² samples a pixel, neighbours blended.
-    Fine,
-    /// One sample a pixel, neighbours blended. Outlines stay smooth: coverage follows from their distance.
-    Coarse,
-    /// One sample a pixel, the highest cone alone.
-    Plain,
-}
-
-impl Detail {
-    /// For a tile that cones cover so many times over or that one broad cone has for itself, in a picture that blends
-    /// or not.
-    pub(crate) fn of_tile(n_layers: f64, is_one_body: bool, is_plain: bool) -> Self {
-        if is_plain {
-            Self::Plain
-        } else if is_one_body || n_layers > FINE_LAYERS {
-            Self::Coarse
-        } else {
-            Self::Fine
+    fn of(job: &Job<'_>, best: &Best) -> Self {
+        let edge = &job.drawn[best.index as usize];
+        let hit = &best.hit;
+        Self {
+            level: hit.level,
+            radius: hit.radius,
+            offset: hit.offset,
+            bend: bend(edge, hit),
+            color: color(job, edge, hit),
+            weight: 1.0,
+            outside: best.outside,
+            ..Self::NOTHING
         }
     }
 
-    fn samples(self) -> usize {
-        if self == Self::Fine { SAMPLES } else { 1 }
+    /// The mean colour.
+    pub(crate) fn base(&self) -> Rgb {
+        self.color.map(|part| part / self.weight.max(f32::MIN_POSITIVE))
+    }
+
+    /// The unit normal that light sees.
+    pub(crate) fn normal(&self) -> Vec3 {
+        (self.shape() + self.bend).normalize_or(Vec3::Z)
+    }
+
+    /// The unit normal of the bare shape; outside of the outline it lies in the plane.
+    fn shape(&self) -> Vec3 {
+        self.offset.extend(self.level.max(0.0).sqrt()).normalize_or(Vec3::Z)
+    }
+
+    /// Adds a colour by its weight.
+    fn tint(&mut self, color: Rgb, weight: f32) {
+        self.color = std::array::from_fn(|k| self.color[k] + weight * color[k]);
+        self.weight += weight;
+    }
+
+    /// Takes in another cone of the same branch.
+    fn chain(&mut self, edge: &Drawn, hit: &Hit, weight: f32) {
+        self.n_chained += weight;
+        let share = weight / self.n_chained;
+        self.offset += share * (hit.offset - self.offset);
+        self.bend += share * (bend(edge, hit) - self.bend);
+    }
+
+    /// Joins a cone of another branch whose level here is `level`; `share` of a whole fillet.
+    fn join(&mut self, edge: &Drawn, hit: &Hit, level: f32, share: f32) {
+        let half_sine = (0.5 * (1.0 - self.shape().dot(shape(hit)))).max(0.0).sqrt();
+        let (small, large) = (self.radius.min(hit.radius), self.radius.max(hit.radius));
+        let k = 2.0 * FILLET * small * (small * large).sqrt() * half_sine * share;
+        let apart = (self.level - level).abs();
+        if apart >= k {
+            return;
+        }
+        let nearness = 1.0 - apart / k;
+        let others = if level > self.level { 1.0 - 0.5 * nearness } else { 0.5 * nearness };
+        self.offset += others * (hit.offset - self.offset);
+        self.bend += others * (bend(edge, hit) - self.bend);
+        self.radius += others * (hit.radius - self.radius);
+        self.level = self.level.max(level) + 0.25 * k * nearness * nearness;
     }
 }
 
-/// Where the samples of a tile lie.
-#[derive(Clone, Copy)]
-struct Lattice {
-    /// The tile's upper left corner, pixels.
-    origin: Vec2,
+fn shape(hit: &Hit) -> Vec3 {
+    hit.offset.extend(hit.height).normalize_or(Vec3::Z)
+}
+
+/// What light sees beside the bare cone; nothing outside of the outline.
+fn bend(edge: &Drawn, hit: &Hit) -> Vec3 {
+    if hit.level > 0.0 { edge.cone.normal(hit) - shape(hit) } else { Vec3::ZERO }
+}
+
+fn color(job: &Job<'_>, edge: &Drawn, hit: &Hit) -> Rgb {
+    job.palette.at(edge.values[0] + hit.share * (edge.values[1] - edge.values[0]))
+}
+
+/// Where samples lie: a square of pixels, some of them per pixel.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lattice {
+    /// The upper left corner, pixels.
+    pub origin: Vec2,
+    /// Pixels per axis.
+    pub n_pixels: usize,
     /// Samples per pixel and axis.
-    n: usize,
+    pub n: usize,
 }
 
 impl Lattice {
-    /// Samples per tile and axis.
-    fn row(self) -> usize {
-        TILE * self.n
+    /// Samples per axis.
+    pub(crate) fn row(self) -> usize {
+        self.n_pixels * self.n
     }
 
-    /// A sample this far outside an outline is still partly covered: half a sample.
-    fn fringe_px(self) -> f32 {
-        0.5 / self.n as f32
-    }
-
-    /// The indices of the samples from `low` to `high` along an axis on which the tile begins at `from`.
+    /// The indices of the samples from `low` to `high` along an axis on which the square begins at `from`.
     fn clip(self, low: f32, high: f32, from: f32) -> Range<usize> {
         let index = |at: f32| (at - from) * self.n as f32 - 0.5;
         // Casts saturate at 0; one sample of slack on either side covers rounding.
@@ -137,161 +205,205 @@ impl Lattice {
     fn place(self, from: f32, index: usize) -> f32 {
         from + (index as f32 + 0.5) * (1.0 / self.n as f32)
     }
+
+    /// The distance from an outline at which a sample begins to be covered: half of it.
+    fn fringe_px(self) -> f32 {
+        0.5 / self.n as f32
+    }
+
+    /// The share of a sample that is covered, by the distance to the outline and the radius. A branch narrower than
+    /// the sample ends within it on the other side too.
+    pub(crate) fn coverage(self, surface: &Surface) -> f32 {
+        let inside = |outside: f32| (0.5 - outside * self.n as f32).clamp(0.0, 1.0);
+        inside(surface.outside) - inside(surface.outside + 2.0 * surface.radius)
+    }
 }
 
-/// The samples of one tile.
+/// The samples of one square.
 pub(crate) struct Samples {
-    lattice: Lattice,
-    best: Vec<Best>,
-    blend: Vec<Blend>,
+    /// Where they lie.
+    pub lattice: Lattice,
+    /// What is highest.
+    pub best: Vec<Best>,
+    /// What is seen.
+    pub surface: Vec<Surface>,
+    /// The highest cone of the branch in hand, by sample, and the samples that it comes near to.
+    branch: Vec<Best>,
+    touched: Vec<usize>,
 }
 
 impl Samples {
     /// Samples that see nothing.
     pub(crate) fn new() -> Self {
-        let n = TILE_SAMPLES * TILE_SAMPLES;
-        let lattice = Lattice { origin: Vec2::ZERO, n: SAMPLES };
-        Self { lattice, best: vec![Best::nothing(); n], blend: vec![Blend::NOTHING; n] }
+        let lattice = Lattice { origin: Vec2::ZERO, n_pixels: 0, n: 1 };
+        Self { lattice, best: Vec::new(), surface: Vec::new(), branch: Vec::new(), touched: Vec::new() }
     }
 
-    /// Draws the listed cones of the tile whose upper left corner is `origin`.
-    pub(crate) fn draw(&mut self, job: &Job<'_>, list: &[u32], origin: Vec2, detail: Detail) {
-        self.lattice = Lattice { origin, n: detail.samples() };
-        let (lattice, n_samples) = (self.lattice, self.lattice.row() * self.lattice.row());
-        self.best[..n_samples].fill(Best::nothing());
-        self.blend[..n_samples].fill(Blend::NOTHING);
-        let is_plain = detail == Detail::Plain;
-        let margin = if job.has_depth && !is_plain { GAP_PX } else { lattice.fringe_px() };
+    /// Draws the listed cones. Without `joins`, each cone stands for itself.
+    pub(crate) fn draw(&mut self, job: &Job<'_>, list: &[u32], lattice: Lattice, joins: bool) {
+        debug_assert!(lattice.row() <= MOST_SAMPLES, "the square is larger than a tile");
+        self.lattice = lattice;
+        let n_samples = lattice.row() * lattice.row();
+        self.best.clear();
+        self.best.resize(n_samples, Best::NOTHING);
+        self.surface.clear();
+        self.surface.resize(n_samples, Surface::NOTHING);
         for &index in list {
-            let edge = &job.drawn[index as usize];
-            let all = |_: usize| true;
-            for_each_sample(&edge.cone, (lattice, margin), all, |sample, hit| {
-                self.best[sample].offer(index, hit, lattice.fringe_px());
-            });
+            let cone = &job.drawn[index as usize].cone;
+            let reach = reach_px(cone, job, lattice, joins);
+            for_each_sample(
+                cone,
+                (lattice, reach),
+                |_| true,
+                |sample, hit| {
+                    self.best[sample].offer(index, hit);
+                },
+            );
         }
-        // Most samples see one cone only and have nothing to blend.
-        for (best, blend) in self.best[..n_samples].iter().zip(&mut self.blend) {
-            if (is_plain || best.n_near == 1) && best.index != NOTHING {
-                blend.add(job, &job.drawn[best.index as usize], &best.hit, 1.0);
+        for (best, surface) in self.best.iter().zip(&mut self.surface) {
+            if best.index != NOTHING {
+                *surface = Surface::of(job, best);
             }
         }
-        if !is_plain {
-            self.blend_neighbours(job, list, margin);
+        if joins {
+            self.branch.resize(n_samples.max(self.branch.len()), Best::NOTHING);
+            let branch_of = |&index: &u32| job.kinship.branch_of(job.drawn[index as usize].node);
+            for of_branch in list.chunk_by(|a, b| branch_of(a) == branch_of(b)) {
+                self.join(job, of_branch);
+            }
+            self.widen();
         }
     }
 
-    /// Blends where several cones reach a sample.
-    fn blend_neighbours(&mut self, job: &Job<'_>, list: &[u32], margin: f32) {
-        let (lattice, best) = (self.lattice, &self.best);
-        for &index in list {
+    /// Lets the cones of a branch join what they come near to.
+    fn join(&mut self, job: &Job<'_>, of_branch: &[u32]) {
+        let Self { lattice, best, surface, branch, touched } = self;
+        let node_of = |index: u32| job.drawn[index as usize].node;
+        let Some(own) = of_branch.first().map(|&index| job.kinship.branch_of(node_of(index))) else { return };
+        for &index in of_branch {
             let edge = &job.drawn[index as usize];
-            let shared = |sample: usize| best[sample].n_near > 1 && best[sample].index != NOTHING;
-            for_each_sample(&edge.cone, (lattice, margin), shared, |sample, hit| {
-                let cone = Reaching { index, edge, hit, fringe_px: lattice.fringe_px() };
-                weigh(job, &mut self.blend[sample], &best[sample], &cone);
+            let is_shared = |sample: usize| best[sample].n_near > 1 && best[sample].index != index;
+            let reach = reach_px(&edge.cone, job, *lattice, true);
+            for_each_sample(&edge.cone, (*lattice, reach), is_shared, |sample, hit| {
+                let winner = &best[sample];
+                if job.kinship.branch_of(node_of(winner.index)) == own {
+                    let near = Near::new(job, winner, (index, hit), lattice.fringe_px());
+                    near.chain(job, &mut surface[sample], winner);
+                    return;
+                }
+                if branch[sample].index == NOTHING {
+                    touched.push(sample);
+                }
+                branch[sample].offer(index, hit);
             });
         }
+        for sample in touched.drain(..) {
+            let Best { index, hit, .. } = std::mem::replace(&mut branch[sample], Best::NOTHING);
+            let near = Near::new(job, &best[sample], (index, hit), lattice.fringe_px());
+            near.meet(job, &mut surface[sample], &best[sample]);
+        }
     }
 
-    /// The pixel at (column, row) of the tile.
-    pub(crate) fn resolve(&self, job: &Job<'_>, column: usize, row: usize) -> Pixel {
-        let Lattice { n, .. } = self.lattice;
-        let first = (row * self.lattice.row() + column) * n;
-        let at = |i: usize| first + (i / n) * self.lattice.row() + i % n;
-        let (mut color, mut covered) = ([0.0; 3], 0.0);
-        for sample in (0..n * n).map(at) {
-            let coverage = self.coverage(sample);
-            if coverage > 0.0 {
-                let shaded = self.shaded(job, sample);
-                color = std::array::from_fn(|k| color[k] + coverage * shaded[k]);
-                covered += coverage;
+    /// Moves the outlines by what the fillets add to the highest cones.
+    fn widen(&mut self) {
+        for (best, surface) in self.best.iter().zip(&mut self.surface) {
+            if surface.level > best.hit.level {
+                let edge_of = |level: f32, radius: f32| (radius * radius - level).max(0.0).sqrt() - radius;
+                let moved = edge_of(best.hit.level, best.hit.radius) - edge_of(surface.level, surface.radius);
+                surface.outside -= moved.max(0.0);
             }
         }
-        if covered <= 0.0 {
-            return Pixel::EMPTY;
-        }
-        // The centre speaks for the pixel; at the rim, where it is empty, the first sample that is not.
-        let center = n * n / 2;
-        let speaker = std::iter::once(center)
-            .chain(0..n * n)
-            .map(at)
-            .find(|&sample| self.coverage(sample) > 0.0)
-            .unwrap_or(first);
-        let best = &self.best[speaker];
-        Pixel {
-            coverage: covered / (n * n) as f32,
-            node: job.drawn[best.index as usize].node,
-            share: best.hit.share,
-            height_px: best.hit.height,
-            normal: self.blend[speaker].normal.normalize_or(Vec3::Z).to_array(),
-            color: color.map(|part| to_byte(part / covered)),
-        }
-    }
-
-    fn coverage(&self, sample: usize) -> f32 {
-        let best = &self.best[sample];
-        if best.index == NOTHING {
-            return 0.0;
-        }
-        (0.5 - best.outside * self.lattice.n as f32).clamp(0.0, 1.0)
-    }
-
-    fn shaded(&self, job: &Job<'_>, sample: usize) -> Rgb {
-        let (best, blend) = (&self.best[sample], &self.blend[sample]);
-        let base = blend.color.map(|part| part / blend.weight.max(f32::MIN_POSITIVE));
-        let normal = blend.normal.normalize_or(Vec3::Z);
-        let place = Place { normal, outside_px: best.outside, radius_px: best.hit.radius };
-        let lit = shade::shade(base, &place, job.colors.rim, job.style);
-        let lit = shade::mix(lit, job.colors.rim, SEAM * blend.seam);
-        shade::mix(lit, job.colors.background, blend.gap)
     }
 }
 
-/// A cone at a sample that it reaches.
-struct Reaching<'a> {
-    index: u32,
+/// How far from its outline a cone is looked at.
+fn reach_px(cone: &Cone, job: &Job<'_>, lattice: Lattice, joins: bool) -> f32 {
+    let fringe_px = lattice.fringe_px();
+    match (joins, job.has_depth) {
+        (false, _) => fringe_px,
+        (true, false) => cone.fillet_px().max(fringe_px),
+        (true, true) => cone.fillet_px().max(GAP_PX),
+    }
+}
+
+/// A cone at a sample that it comes near to, and how it stands to the highest one.
+struct Near<'a> {
     edge: &'a Drawn,
     hit: Hit,
+    /// Its level, measured from the axis of the highest: in space the axes may lie at different depths.
+    level: f32,
+    /// The sum of the radii.
+    radii: f32,
+    /// How much the two belong together: 1 in one neighbourhood of the tree, 0 in distant parts.
+    kin: f32,
     fringe_px: f32,
 }
 
-/// Adds a cone's say to the blending of a sample that several cones reach.
-fn weigh(job: &Job<'_>, blend: &mut Blend, best: &Best, cone: &Reaching<'_>) {
-    let Reaching { index, edge, hit, fringe_px } = *cone;
-    let winner = &job.drawn[best.index as usize];
-    let arc = |edge: &Drawn, hit: &Hit| edge.arc_px[0] + hit.share * (edge.arc_px[1] - edge.arc_px[0]);
-    let radii = hit.radius + best.hit.radius;
-    let is_near = |reach: f32| {
-        index == best.index
-            || job.kinship.is_near(
-                (edge.node, arc(edge, &hit)),
-                (winner.node, arc(winner, &best.hit)),
-                reach * radii,
-            )
-    };
-    if hit.outside > fringe_px {
-        // Beside the outline: a gap if this cone passes in front of a distant part.
-        let passes_in_front = hit.z > best.hit.z + 0.5 * radii && !is_near(2.0 * BLEND_REACH);
-        if passes_in_front {
-            blend.gap = blend.gap.max((GAP_PX - hit.outside).clamp(0.0, 1.0));
+impl<'a> Near<'a> {
+    fn new(job: &Job<'a>, best: &Best, (index, hit): (u32, Hit), fringe_px: f32) -> Self {
+        let (edge, winner) = (&job.drawn[index as usize], &job.drawn[best.index as usize]);
+        let place = |edge: &Drawn, hit: &Hit| {
+            (edge.node, edge.arc_px[0] + hit.share * (edge.arc_px[1] - edge.arc_px[0]))
+        };
+        let radii = hit.radius + best.hit.radius;
+        let path = job.kinship.path_px(place(edge, &hit), place(winner, &best.hit), APART * radii);
+        let kin = ((APART - path / radii) / (APART - JOINED)).clamp(0.0, 1.0);
+        // Beyond the outline there is no surface whose depth would count.
+        let behind = (hit.z - hit.height) - (best.hit.z - best.hit.height);
+        let solid = (hit.height / hit.radius).min(1.0);
+        let level = hit.level + 2.0 * hit.height * behind + solid * behind * behind.abs();
+        Self { edge, hit, level, radii, kin, fringe_px }
+    }
+
+    /// How much of its normal and colour reaches the sample.
+    fn weight(&self, best: &Best) -> f32 {
+        let reach = COLOR_REACH * self.hit.radius * self.hit.radius;
+        let fade = (1.0 - (best.hit.level.max(0.0) - self.level) / reach).clamp(0.0, 1.0);
+        self.kin * self.edge.cone.say(&self.hit) * fade * fade
+    }
+
+    /// What a cone of the same branch does.
+    fn chain(&self, job: &Job<'_>, surface: &mut Surface, best: &Best) {
+        let weight = self.weight(best);
+        if weight > 0.0 {
+            surface.chain(self.edge, &self.hit, weight);
+            surface.tint(color(job, self.edge, &self.hit), weight);
+        } else if self.kin <= 0.0 {
+            self.pass(job, surface, best);
         }
-        return;
     }
-    let lower_by = (best.hit.z - hit.z) / (BLEND_SHARE * best.hit.radius).max(0.5);
-    let fade = (1.0 - lower_by).max(0.0);
-    if fade <= 0.0 {
-        return;
+
+    /// What the highest cone of another branch does.
+    fn meet(&self, job: &Job<'_>, surface: &mut Surface, best: &Best) {
+        if self.kin <= 0.0 {
+            return self.pass(job, surface, best);
+        }
+        let weight = self.weight(best);
+        if weight > 0.0 {
+            surface.tint(color(job, self.edge, &self.hit), weight);
+        }
+        let say =
+            self.kin * self.edge.cone.say(&self.hit) * job.drawn[best.index as usize].cone.say(&best.hit);
+        surface.join(self.edge, &self.hit, self.level, say);
     }
-    if is_near(BLEND_REACH) {
-        blend.add(job, edge, &hit, if index == best.index { 1.0 } else { fade * fade });
-    } else if !is_near(2.0 * BLEND_REACH) {
-        // The surfaces meet at an angle here, so the gap in height grows about as fast as the distance.
-        let lower_px = best.hit.z - hit.z;
-        blend.seam = blend.seam.max((1.0 - lower_px / SEAM_PX).max(0.0));
+
+    /// What a distant part does.
+    fn pass(&self, job: &Job<'_>, surface: &mut Surface, best: &Best) {
+        let hit = &self.hit;
+        if hit.outside > self.fringe_px {
+            // Beside the outline: a gap if this cone passes in front.
+            if job.has_depth && hit.z > best.hit.z + 0.5 * self.radii {
+                surface.gap = surface.gap.max((GAP_PX - hit.outside).clamp(0.0, 1.0));
+            }
+        } else {
+            // The surfaces meet at an angle here, so the gap in height grows about as fast as the distance.
+            let lower_px = best.hit.z - hit.z;
+            surface.seam = surface.seam.max((1.0 - lower_px / SEAM_PX).clamp(0.0, 1.0));
+        }
     }
 }
 
-/// Calls `visit` with each sample of the tile at `origin` that a cone reaches and that is `wanted`.
+/// Calls `visit` with each sample that a cone comes near to and that is `wanted`.
 fn for_each_sample(
     cone: &Cone,
     (lattice, margin): (Lattice, f32),

@@ -21,6 +21,8 @@ pub(crate) struct Scene {
     pub points_mm: Vec<DVec3>,
     /// The radius to draw by node, mm; at least 0.
     pub radii_mm: Vec<f64>,
+    /// By how many degrees the whole was turned counter-clockwise, to fit a page.
+    pub turn_deg: u32,
 }
 
 impl Scene {
@@ -62,12 +64,23 @@ impl Scene {
                 return Err(Error::Number { node, what: "drawn radius", value: radius_mm });
             }
         }
-        Ok(Self { points_mm, radii_mm })
+        Ok(Self { points_mm, radii_mm, turn_deg: 0 })
     }
 
     /// The same centrelines without any width.
     pub(crate) fn without_radii(self) -> Self {
         Self { radii_mm: vec![0.0; self.radii_mm.len()], ..self }
+    }
+
+    /// The same, turned counter-clockwise about the origin.
+    pub(crate) fn turned(&self, turn_deg: u32) -> Self {
+        let turn = math::unit_vector(f64::from(turn_deg).to_radians());
+        let turned = |point: &DVec3| turn.rotate(point.truncate()).extend(point.z);
+        Self {
+            points_mm: self.points_mm.iter().map(turned).collect(),
+            radii_mm: self.radii_mm.clone(),
+            turn_deg: (self.turn_deg + turn_deg) % 360,
+        }
     }
 
     /// The corners of the box that holds every drawn disc, mm.

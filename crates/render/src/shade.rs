@@ -8,7 +8,7 @@
 
 use glam::Vec3;
 
-use crate::palette::Rgb;
+use crate::palette::{PageColors, Rgb};
 use crate::params::Style;
 
 /// Towards the light: left, up, to the viewer (y points down). Unit length to six digits.
@@ -25,8 +25,8 @@ const RIM: f32 = 0.55;
 /// Width of the outline in pixels, and its largest share of the radius.
 const OUTLINE_PX: f32 = 1.1;
 const OUTLINE_SHARE: f32 = 0.3;
-/// How dark the outline is.
-const OUTLINE: f32 = 0.5;
+/// How dark the seam is where distant parts touch.
+pub(crate) const SEAM: f32 = 0.55;
 
 /// A lit place.
 #[derive(Clone, Copy, Debug)]
@@ -40,10 +40,15 @@ pub(crate) struct Place {
 }
 
 /// The colour of a place.
-pub(crate) fn shade(base: Rgb, place: &Place, rim: Rgb, style: Style) -> Rgb {
-    if style == Style::Line {
+pub(crate) fn shade(base: Rgb, place: &Place, colors: &PageColors, style: Style) -> Rgb {
+    let rim = colors.rim;
+    let outline_px = OUTLINE_PX.min(OUTLINE_SHARE * place.radius_px).max(1e-3);
+    let outline = colors.outline * (1.0 + place.outside_px / outline_px).clamp(0.0, 1.0);
+    match style {
         // Lines are flat; a little of the rim keeps the palest colours off the paper.
-        return mix(base, rim, 0.12);
+        Style::Line => return mix(base, rim, 0.24 * colors.outline),
+        Style::Ribbon => return mix(base, rim, outline),
+        Style::PseudoSurface => {}
     }
     let n = place.normal;
     let lambert = ((n.dot(TO_LIGHT) + WRAP) / (1.0 + WRAP)).max(0.0);
@@ -58,9 +63,7 @@ pub(crate) fn shade(base: Rgb, place: &Place, rim: Rgb, style: Style) -> Rgb {
     let lit = base.map(|part| (part * light + HIGHLIGHT * gloss * (1.0 - 0.5 * part)).clamp(0.0, 1.0));
 
     let turned = 1.0 - n.z.clamp(0.0, 1.0);
-    let outline_px = OUTLINE_PX.min(OUTLINE_SHARE * place.radius_px).max(1e-3);
-    let edge = (1.0 + place.outside_px / outline_px).clamp(0.0, 1.0);
-    mix(lit, rim, (RIM * turned * turned).max(OUTLINE * edge))
+    mix(lit, rim, (RIM * turned * turned).max(outline))
 }
 
 /// `a` with a share of `b`.

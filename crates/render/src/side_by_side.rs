@@ -1,6 +1,7 @@
 //! The layouts of several methods beside the tree in space, in one figure.
 //!
 //! **Input** for each tree its global view and the layouts of its methods. **Output** PNG and SVG.
+//! **Files** `panel`: what stands around each tree; `document`: the SVG.
 //! **Steps** 1. Each tree is a section: its view in space, then its layouts, tiled in rows at one scale. 2. Main
 //! subtrees have the same colours in every panel. 3. Crossings get rings; of a cluster, as many as do not hide it.
 //! 4. Below each panel its row of the table in short; what is best among the section's layouts without crossings is
@@ -9,24 +10,27 @@
 //! section shows lines.
 //! **Source** figures of section 5 of [Hu2022]. **Cost** that of as many small pictures.
 
-use std::collections::BTreeMap;
-use std::fmt::Write as _;
+mod document;
+mod panel;
 
 use espalier_model::{Branches, MethodRow, Tree, View};
 use glam::DVec2;
+
+use panel::SIDE;
 
 use crate::coloring::Coloring;
 use crate::drawing::{Group, Mark};
 use crate::furniture::{self, Heading};
 use crate::kinship::Kinship;
 use crate::page::{MAX_PIXELS, Page, Pen};
-use crate::palette::{PageColors, hex};
+use crate::paint::Canvas;
+use crate::palette::PageColors;
 use crate::params::{Compass, Params, Style};
-use crate::raster::{self, Drawn, Job, Pixel};
+use crate::raster::{self, Drawn, Job, Raster};
 use crate::scene::Scene;
 use crate::text::{Anchor, Face};
 use crate::tiling::{Room, Tiling};
-use crate::{Error, MAX_LAYERS, heading, paint, parts, sketch, svg};
+use crate::{Error, MAX_LAYERS, parts, sketch};
 
 /// Sizes in layout units: font sizes of panel titles and notes, the least panel, the space between panels.
 const TITLE: f64 = 1.5;
@@ -35,8 +39,6 @@ const LEAST_PANEL: f64 = 21.0;
 const GAP: f64 = 2.2;
 /// Space around a tree in its panel, in layout units.
 const RIM: f64 = 2.2;
-/// The same for the letters to its left and right, on top of that.
-const SIDE: f64 = 3.3;
 /// Line height over font size.
 const LEADING: f64 = 1.4;
 /// Height of the key below a section, in layout units.
@@ -45,8 +47,6 @@ const KEY: f64 = 5.0;
 const MOST_HEIGHT: f64 = 0.75;
 /// The same of each tree where there are several.
 const SECTION_HEIGHT: f64 = 0.55;
-/// From this many on, the rings of crossings are smaller, so as not to hide the tree.
-const MANY_CROSSINGS: usize = 40;
 /// Edges in small panels are at least this share of `min_width_px` wide.
 const PANEL_PEN: f64 = 0.7;
 /// Lines of notes below a panel.
@@ -93,7 +93,7 @@ pub struct SideBySide {
 ///
 /// # Errors
 /// [`Error`] if a parameter is out of range, a layout is another tree's, a number cannot be drawn, or the figure would
-/// be over 2²⁵ pixels.
+/// be over 2²⁷ pixels.
 pub fn side_by_side(sections: &[Section<'_>], params: &Params) -> Result<SideBySide, Error> {
     params.validate()?;
     let artist = Artist { params, face: Face::built_in()?, colors: PageColors::of(params.theme) };
@@ -102,13 +102,12 @@ pub fn side_by_side(sections: &[Section<'_>], params: &Params) -> Result<SideByS
     if u64::from(width) * u64::from(height) > MAX_PIXELS {
         return Err(Error::TooLarge { width, height, limit: MAX_PIXELS });
     }
-    let mut pixels = vec![Pixel::EMPTY; width as usize * height as usize];
+    let mut canvas = Canvas::new([width, height], artist.colors.background)?;
     for frame in &sheet.frames {
-        artist.draw(frame, &mut pixels);
+        artist.draw(frame, &mut canvas);
     }
-    let page = Page { width, height, ..artist.page(DVec2::ZERO, DVec2::ONE, 1.0) };
-    let png = paint::png(&page, &pixels, &sheet.groups, (artist.colors.background, &artist.face))?;
-    Ok(SideBySide { png, svg: artist.svg(&sheet, height) })
+    canvas.mark(&sheet.groups, &artist.face);
+    Ok(SideBySide { png: canvas.png(), svg: artist.svg(&sheet, height) })
 }
 
 /// A panel in its place.
@@ -280,13 +279,12 @@ impl Artist<'_> {
         }
     }
 
-    fn draw(&self, frame: &Frame<'_>, pixels: &mut [Pixel]) {
+    fn draw(&self, frame: &Frame<'_>, canvas: &mut Canvas) {
         let page = local(&frame.page);
         let kinship = kinship(frame);
         let drawn: Vec<Drawn> = sketch::edges(frame.tree, &frame.scene, &page, &frame.coloring, &kinship);
-        let size = size_of(&page);
-        let panel = raster::rasterise(&Job {
-            size,
+        let raster = Raster::new(Job {
+            size: size_of(&page),
             drawn: &drawn,
             kinship: &kinship,
             palette: &frame.coloring.palette,
@@ -294,80 +292,7 @@ impl Artist<'_> {
             style: page.pen.style,
             has_depth: frame.has_depth,
         });
-        let width = self.params.width_px as usize;
-        let corner = [frame.page.area[0].x as usize, frame.page.area[0].y as usize];
-        let n_columns = size[0].min(width - corner[0]);
-        for (row, line) in panel.chunks(size[0]).enumerate() {
-            let start = (corner[1] + row) * width + corner[0];
-            if let Some(target) = pixels.get_mut(start..start + n_columns) {
-                target.copy_from_slice(&line[..n_columns]);
-            }
-        }
-    }
-
-    /// Title, notes, root and crossings of a panel.
-    fn panel_marks(&self, section: &Section<'_>, frame: &Frame<'_>, panel_idx: usize) -> Group {
-        let unit = self.unit_px();
-        let [low, high] = frame.page.area;
-        let root = furniture::root_mark(&frame.page, frame.tree, &frame.scene, &self.colors);
-        let mut marks: Vec<Mark> =
-            root.marks.into_iter().filter(|mark| matches!(mark, Mark::Ring { .. })).collect();
-        let panel = panel_idx.checked_sub(1).map(|idx| &section.panels[idx]);
-        if let Some(panel) = panel {
-            let (radius, width) =
-                if panel.crossings.len() < MANY_CROSSINGS { (0.6, 0.2) } else { (0.4, 0.13) };
-            let points = panel
-                .crossings
-                .iter()
-                .map(|&pair| frame.page.px(crossing_point(frame.tree, panel.positions_mm, pair)));
-            marks.extend(apart(points, 0.8 * radius * unit).into_iter().map(|center| Mark::Ring {
-                center,
-                radius_px: radius * unit,
-                width_px: width * unit,
-                color: self.colors.alarm,
-            }));
-        } else {
-            let view = section.view;
-            let axes = [view.up.cross(view.towards_camera), view.up];
-            let around = self.around_tree(frame);
-            let compass = furniture::compass(&around, axes, section.compass, &self.colors);
-            marks.extend(compass.into_iter().flat_map(|group| group.marks));
-        }
-        let (title, notes) = match panel {
-            Some(panel) => {
-                let chosen = if panel.is_chosen { "  (the map)" } else { "" };
-                let title = format!("{}{}{chosen}", panel.row.method, other_targets(section, panel.row));
-                (title, notes(section, panel.row))
-            }
-            None => (
-                "in space, from the global view".to_owned(),
-                heading::size_of(frame.tree, &frame.branches, self.params)
-                    .into_iter()
-                    .map(|text| (text, false))
-                    .collect(),
-            ),
-        };
-        let at = DVec2::new(low.x, low.y - 0.45 * TITLE * unit);
-        marks.push(strong(self.text(at, TITLE, self.colors.ink, &title)));
-        for (line, (text, is_best)) in notes.into_iter().take(N_NOTES).enumerate() {
-            let at = DVec2::new(low.x, high.y + (LEADING * (line as f64 + 0.9) * NOTE) * unit);
-            let color = if is_best { self.colors.ink } else { self.colors.soft };
-            let mark = self.text(at, NOTE, color, &text);
-            marks.push(if is_best { strong(mark) } else { mark });
-        }
-        Group { name: "panel", marks }
-    }
-
-    /// The panel's page with its area drawn close around the tree.
-    fn around_tree(&self, frame: &Frame<'_>) -> Page {
-        let (low_mm, high_mm) = frame.scene.bounds_mm();
-        let rim = DVec2::splat(RIM * self.unit_px());
-        let low = frame.page.px(DVec2::new(low_mm.x, high_mm.y)) - rim;
-        let high = frame.page.px(DVec2::new(high_mm.x, low_mm.y)) + rim;
-        // Letters to the left and right need more room than those above and below.
-        let side = DVec2::new(SIDE * self.unit_px(), 0.0);
-        let [panel_low, panel_high] = frame.page.area;
-        Page { area: [(low - side).max(panel_low), (high + side).min(panel_high)], ..frame.page }
+        canvas.surface(&raster, [frame.page.area[0].x as usize, frame.page.area[0].y as usize], |_, _| ());
     }
 
     /// Scale bar and what the marks mean.
@@ -404,37 +329,6 @@ impl Artist<'_> {
         let size_px = size * self.unit_px();
         Mark::Text { at, size_px, anchor: Anchor::Start, is_strong: false, color, text: text.to_owned() }
     }
-
-    fn svg(&self, sheet: &Sheet<'_>, height: u32) -> String {
-        let (width, title) =
-            (self.params.width_px, self.params.title.as_deref().unwrap_or("methods side by side"));
-        let mut out = String::new();
-        // Writing to a String cannot fail.
-        let _ = writeln!(
-            out,
-            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" \
-             xmlns:xlink=\"http://www.w3.org/1999/xlink\" version=\"1.1\" width=\"{width}\" height=\"{height}\" \
-             viewBox=\"0 0 {width} {height}\" data-format=\"espalier-compare-svg\" data-version=\"1\">\n\
-             <title>{}</title>\n<rect id=\"background\" width=\"{width}\" height=\"{height}\" fill=\"{}\"/>",
-            svg::escaped(title),
-            hex(self.colors.background)
-        );
-        for (panel_idx, frame) in sheet.frames.iter().enumerate() {
-            let prefix = format!("panel-{panel_idx}-");
-            let content = svg::Content {
-                tree: frame.tree,
-                branches: &frame.branches,
-                scene: &frame.scene,
-                coloring: &frame.coloring,
-                title,
-                prefix: &prefix,
-            };
-            svg::tree(&mut out, &content, &frame.page, &self.colors);
-        }
-        svg::write_groups(&mut out, &sheet.groups);
-        out.push_str("</svg>\n");
-        out
-    }
 }
 
 fn strong(mark: Mark) -> Mark {
@@ -465,86 +359,4 @@ fn size_of(page: &Page) -> [usize; 2] {
 
 fn kinship(frame: &Frame<'_>) -> Kinship {
     Kinship::new(frame.tree, &frame.branches, &frame.scene, frame.page.px_per_mm)
-}
-
-/// What tells a method that ran twice apart: the targets of its row, where they are not the embedding's.
-fn other_targets(section: &Section<'_>, row: &MethodRow) -> String {
-    let chosen = section.panels.iter().find(|panel| panel.is_chosen).map(|panel| panel.row.targets);
-    let is_other = chosen.is_some_and(|chosen| chosen != row.targets);
-    if is_other { format!(", targets {}", row.targets.name()) } else { String::new() }
-}
-
-/// What is said below a layout, each with whether it is the best of its section.
-fn notes(section: &Section<'_>, row: &MethodRow) -> Vec<(String, bool)> {
-    // A layout may be scored against other targets than the embedding.
-    let kind = section.panels.iter().find(|panel| panel.is_chosen).map(|panel| panel.row.targets);
-    let compares = |row: &&MethodRow| row.crossings == 0 && kind.is_none_or(|kind| kind == row.targets);
-    let planar = || section.panels.iter().map(|panel| panel.row).filter(compares);
-    // What reads alike is equally good.
-    let note = |of: &dyn Fn(&MethodRow) -> f64, say: &dyn Fn(f64) -> String, rest: String| {
-        let least = planar().map(of).fold(f64::INFINITY, f64::min);
-        let said = say(of(row));
-        let is_best = compares(&row) && said == say(least);
-        (format!("{said}{rest}"), is_best)
-    };
-    let losses = &row.losses;
-    let crossings = match row.crossings {
-        0 => note(
-            &|row| row.energy.total(),
-            &|energy| format!("no crossings, energy {}", crate::unit::text(energy, 3)),
-            String::new(),
-        ),
-        1 => ("1 crossing".to_owned(), false),
-        n => (format!("{n} crossings"), false),
-    };
-    vec![
-        crossings,
-        note(
-            &|row| row.losses.angle3d_error_mean_deg,
-            &|mean| format!("angles off by {}", heading::degrees(mean)),
-            format!(", max {}", heading::degrees(losses.angle3d_error_max_deg)),
-        ),
-        note(
-            &|row| row.losses.length_loss_mean,
-            &|mean| format!("lengths off by {}", heading::percent(mean)),
-            format!(", max {}", heading::percent(losses.length_loss_max)),
-        ),
-        note(&|row| row.losses.stress, &|stress| format!("stress {stress:.3}"), String::new()),
-        // The largest is the best.
-        note(
-            &|row| -row.losses.clearance_min_edges,
-            &|clearance| format!("clearance {:.3} edges", -clearance),
-            String::new(),
-        ),
-    ]
-}
-
-/// Those of the points, the first first, that are not nearer than `least_px` to one taken before: rings upon rings
-/// would hide the tree. Cells as wide as that hold at most four taken points.
-fn apart(points: impl Iterator<Item = DVec2>, least_px: f64) -> Vec<DVec2> {
-    let mut taken: BTreeMap<[i64; 2], Vec<DVec2>> = BTreeMap::new();
-    let mut list = Vec::new();
-    for point in points {
-        let cell = (point / least_px).floor().clamp(DVec2::splat(-1e9), DVec2::splat(1e9));
-        let [column, row] = [cell.x as i64, cell.y as i64];
-        let around = [-1, 0, 1].map(|step| taken.range([column + step, row - 1]..=[column + step, row + 1]));
-        let near = around.into_iter().flatten().flat_map(|(_, points)| points);
-        if near.into_iter().all(|other| other.distance_squared(point) >= least_px * least_px) {
-            taken.entry([column, row]).or_default().push(point);
-            list.push(point);
-        }
-    }
-    list
-}
-
-/// Where two edges cross; the middle between their midpoints where they are parallel.
-fn crossing_point(tree: &Tree, positions: &[DVec2], (a, b): (usize, usize)) -> DVec2 {
-    let ends = |node: usize| (positions[tree.parent(node).unwrap_or(0)], positions[node]);
-    let ((a0, a1), (b0, b1)) = (ends(a), ends(b));
-    let (along_a, along_b) = (a1 - a0, b1 - b0);
-    let across = along_a.perp_dot(along_b);
-    if across.abs() <= 1e-12 * along_a.length() * along_b.length() {
-        return 0.25 * (a0 + a1 + b0 + b1);
-    }
-    a0 + along_a * ((b0 - a0).perp_dot(along_b) / across).clamp(0.0, 1.0)
 }

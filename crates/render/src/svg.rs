@@ -9,14 +9,15 @@
 
 use std::fmt::Write as _;
 
+use espalier_model::xml::escape;
 use espalier_model::{Branch, Branches, Tree};
 use glam::DVec2;
 
 use crate::coloring::{Coloring, mean_radius_mm};
 use crate::drawing::{Group, Mark};
-use crate::outline::outline;
+use crate::outline::{outline, polyline, svg_data};
 use crate::page::Page;
-use crate::palette::{PageColors, Palette, hex};
+use crate::palette::{PageColors, Palette, Rgb, hex};
 use crate::params::Style;
 use crate::scene::Scene;
 use crate::text::Anchor;
@@ -53,11 +54,12 @@ pub(crate) fn svg(content: &Content<'_>, page: &Page, groups: &[Group], colors: 
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" \
          xmlns:xlink=\"http://www.w3.org/1999/xlink\" version=\"1.1\" width=\"{width}\" height=\"{height}\" \
          viewBox=\"0 0 {width} {height}\" data-format=\"espalier-planar-svg\" data-version=\"1\" \
-         data-mm-per-px=\"{:.9e}\" data-origin-px=\"{:.2} {:.2}\">\n<title>{}</title>",
+         data-mm-per-px=\"{:.9e}\" data-origin-px=\"{:.2} {:.2}\" data-turn-deg=\"{}\">\n<title>{}</title>",
         1.0 / page.px_per_mm,
         page.origin_px.x,
         page.origin_px.y,
-        escaped(content.title)
+        content.scene.turn_deg,
+        escape(content.title)
     );
     let _ = writeln!(
         out,
@@ -81,7 +83,7 @@ pub(crate) fn write_groups(out: &mut String, groups: &[Group]) {
     }
 }
 
-/// The branches, thick over thin as in the raster; of equals the parent over the starts of its children.
+/// The branches, each a path, over their dark edges.
 pub(crate) fn tree(out: &mut String, content: &Content<'_>, page: &Page, colors: &PageColors) {
     let prefix = content.prefix;
     let list = content.branches.list();
@@ -96,10 +98,8 @@ pub(crate) fn tree(out: &mut String, content: &Content<'_>, page: &Page, colors:
         );
         return;
     }
-    let mut order: Vec<usize> = (0..list.len()).rev().collect();
-    let radii: Vec<f64> = list.iter().map(|branch| mean_radius_mm(content.tree, branch)).collect();
-    order.sort_by(|&a, &b| radii[a].total_cmp(&radii[b]));
-    if page.pen.style == Style::PseudoSurface {
+    let order = drawing_order(content);
+    if page.pen.style != Style::Line {
         let rim = hex(colors.rim);
         let _ = writeln!(
             out,
@@ -117,30 +117,59 @@ pub(crate) fn tree(out: &mut String, content: &Content<'_>, page: &Page, colors:
     out.push_str("</g>\n");
 }
 
+/// A branch in pixels, and its one colour.
+pub(crate) struct Ribbon {
+    /// The middle and the radius at each node.
+    pub discs: Vec<(DVec2, f64)>,
+    /// The mean colour over its length.
+    pub color: Rgb,
+}
+
+impl Ribbon {
+    pub(crate) fn of(content: &Content<'_>, page: &Page, branch: &Branch) -> Self {
+        let Content { tree, scene, coloring, .. } = *content;
+        let (mut value, mut length) = (0.0, 0.0);
+        for node in branch.nodes.clone() {
+            let edge = tree.edge_length_mm(node);
+            value += edge * f64::from(coloring.ends[node].iter().sum::<f32>()) / 2.0;
+            length += edge;
+        }
+        let disc =
+            |node: usize| (page.px(scene.points_mm[node].truncate()), page.radius_px(scene.radii_mm[node]));
+        Self {
+            discs: branch.polyline().map(disc).collect(),
+            color: coloring.palette.at((value / length) as f32),
+        }
+    }
+}
+
+/// The branches in the order in which they are drawn: thick over thin as in the raster; of equals the parent over the
+/// starts of its children.
+pub(crate) fn drawing_order(content: &Content<'_>) -> Vec<usize> {
+    let list = content.branches.list();
+    let mut order: Vec<usize> = (0..list.len()).rev().collect();
+    let radii: Vec<f64> = list.iter().map(|branch| mean_radius_mm(content.tree, branch)).collect();
+    order.sort_by(|&a, &b| radii[a].total_cmp(&radii[b]));
+    order
+}
+
 fn write_branch(
     out: &mut String,
     content: &Content<'_>,
     page: &Page,
     (branch_idx, branch): (usize, &Branch),
 ) {
-    let (tree, scene, prefix) = (content.tree, content.scene, content.prefix);
-    let (mut value, mut length) = (0.0, 0.0);
-    for node in branch.nodes.clone() {
-        let edge = tree.edge_length_mm(node);
-        value += edge * f64::from(content.coloring.ends[node].iter().sum::<f32>()) / 2.0;
-        length += edge;
-    }
-    let fill = hex(content.coloring.palette.at((value / length) as f32));
-    let points: Vec<(DVec2, f64)> = branch
-        .polyline()
-        .map(|node| (page.px(scene.points_mm[node].truncate()), page.radius_px(scene.radii_mm[node])))
-        .collect();
+    let (tree, prefix) = (content.tree, content.prefix);
+    let Ribbon { discs, color } = Ribbon::of(content, page, branch);
+    let fill = hex(color);
     let paint = match page.pen.style {
-        Style::PseudoSurface => format!("d=\"{}\" fill=\"{fill}\"", outline(&points)),
+        Style::PseudoSurface | Style::Ribbon => {
+            format!("d=\"{}Z\" fill=\"{fill}\"", svg_data(&outline(&discs)))
+        }
         Style::Line => format!(
             "d=\"{}\" fill=\"none\" stroke=\"{fill}\" stroke-width=\"{:.2}\" stroke-linecap=\"round\" \
              stroke-linejoin=\"round\"",
-            polyline(&points),
+            svg_data(&polyline(&discs)),
             page.pen.min_width_px
         ),
     };
@@ -148,21 +177,14 @@ fn write_branch(
     let _ = writeln!(
         out,
         "<path id=\"{prefix}branch-{branch_idx}\" data-branch=\"{branch_idx}\"{parent} data-generation=\"{}\" \
-         data-strahler=\"{}\" data-nodes=\"{} {}\" data-length-mm=\"{length:.6}\" data-radius-mm=\"{:.6}\" {paint}/>",
+         data-strahler=\"{}\" data-nodes=\"{} {}\" data-length-mm=\"{:.6}\" data-radius-mm=\"{:.6}\" {paint}/>",
         branch.generation,
         branch.strahler,
         branch.nodes.start,
         branch.end(),
+        content.branches.length_mm(tree, branch_idx),
         mean_radius_mm(tree, branch),
     );
-}
-
-fn polyline(points: &[(DVec2, f64)]) -> String {
-    let mut path = String::new();
-    for (i, (point, _)) in points.iter().enumerate() {
-        let _ = write!(path, "{}{:.2} {:.2}", if i == 0 { "M" } else { "L" }, point.x, point.y);
-    }
-    path
 }
 
 fn write_mark(out: &mut String, mark: &Mark) {
@@ -181,7 +203,7 @@ fn write_mark(out: &mut String, mark: &Mark) {
                 at.x,
                 at.y,
                 hex(*color),
-                escaped(text)
+                escape(text)
             )
         }
         Mark::Line { from, to, width_px, color } => writeln!(
@@ -230,33 +252,5 @@ fn write_bar(out: &mut String, [corner, size]: [DVec2; 2], palette: &Palette) {
             corner.y + size.y - (i + 1) as f64 * step,
             size.x
         );
-    }
-}
-
-/// Text as XML: markup characters by their names, and without the control characters that XML 1.0 forbids.
-pub(crate) fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for letter in text.chars() {
-        match letter {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&apos;"),
-            '\t' | '\n' | '\r' => out.push(' '),
-            letter if letter.is_control() || matches!(letter, '\u{fffe}' | '\u{ffff}') => {}
-            letter => out.push(letter),
-        }
-    }
-    out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn nothing_escapes_the_text() {
-        assert_eq!(escaped("a<b>&\"'\u{1}\n"), "a&lt;b&gt;&amp;&quot;&apos; ");
     }
 }

@@ -20,6 +20,28 @@ pub(crate) enum Anchor {
     End,
 }
 
+impl Anchor {
+    /// The share of a line's width that lies to the left of the point.
+    pub(crate) fn share(self) -> f32 {
+        match self {
+            Self::Start => 0.0,
+            Self::Middle => 0.5,
+            Self::End => 1.0,
+        }
+    }
+}
+
+/// A glyph of a line.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GlyphAt {
+    /// Its number in the face.
+    pub glyph: u16,
+    /// What it stands for.
+    pub letter: char,
+    /// How far from the start of the line, in ems.
+    pub pen_em: f32,
+}
+
 /// A font face.
 #[derive(Debug)]
 pub(crate) struct Face {
@@ -37,20 +59,39 @@ impl Face {
 
     /// The width of a line at `size_px` per em, in pixels.
     pub(crate) fn width(&self, text: &str, size_px: f32) -> f32 {
-        self.walk(text, |_, _| {}) * self.per_em * size_px
+        self.walk(text, |_, _, _| {}) * self.per_em * size_px
+    }
+
+    /// The glyphs of a line.
+    pub(crate) fn glyphs(&self, text: &str) -> Vec<GlyphAt> {
+        let mut glyphs = Vec::new();
+        self.walk(text, |glyph, letter, pen| {
+            glyphs.push(GlyphAt { glyph: glyph.0, letter, pen_em: pen * self.per_em });
+        });
+        glyphs
+    }
+
+    /// How far a glyph moves the pen, in ems.
+    pub(crate) fn advance(&self, glyph: u16) -> f32 {
+        self.font.h_advance_unscaled(ab_glyph::GlyphId(glyph)) * self.per_em
+    }
+
+    /// How far the face reaches above and below the baseline, in ems; below is under 0.
+    pub(crate) fn extent(&self) -> (f32, f32) {
+        (self.font.ascent_unscaled() * self.per_em, self.font.descent_unscaled() * self.per_em)
+    }
+
+    /// The face's file.
+    pub(crate) fn bytes(&self) -> &'static [u8] {
+        epaint_default_fonts::UBUNTU_LIGHT
     }
 
     /// The outline of a line whose baseline passes through (x, y).
     pub(crate) fn path(&self, text: &str, size_px: f32, anchor: Anchor, (x, y): (f32, f32)) -> Option<Path> {
-        let share = match anchor {
-            Anchor::Start => 0.0,
-            Anchor::Middle => 0.5,
-            Anchor::End => 1.0,
-        };
-        let left = x - share * self.width(text, size_px);
+        let left = x - anchor.share() * self.width(text, size_px);
         let scale = self.per_em * size_px;
         let mut builder = PathBuilder::new();
-        self.walk(text, |glyph, pen| {
+        self.walk(text, |glyph, _, pen| {
             let place = |p: Point| (left + (pen + p.x) * scale, y - p.y * scale);
             if let Some(outline) = self.font.outline(glyph) {
                 add_curves(&mut builder, &outline.curves, place);
@@ -92,14 +133,14 @@ impl Face {
     }
 
     /// Visits each glyph with its pen position in font units; returns the advance of the whole.
-    fn walk(&self, text: &str, mut visit: impl FnMut(ab_glyph::GlyphId, f32)) -> f32 {
+    fn walk(&self, text: &str, mut visit: impl FnMut(ab_glyph::GlyphId, char, f32)) -> f32 {
         let (mut pen, mut last) = (0.0, None);
         for letter in text.chars().filter(|letter| !letter.is_control()) {
             let glyph = self.font.glyph_id(letter);
             if let Some(last) = last {
                 pen += self.font.kern_unscaled(last, glyph);
             }
-            visit(glyph, pen);
+            visit(glyph, letter, pen);
             pen += self.font.h_advance_unscaled(glyph);
             last = Some(glyph);
         }

@@ -6,7 +6,7 @@ mod common;
 use common::{fern, flat, front, node, tube};
 use espalier_model::diagnose::{Class, Diagnose};
 use espalier_model::{Embedding, Tree};
-use espalier_render::{ColorBy, Compass, Error, Params, Rendered, Style, Theme, Unit, render};
+use espalier_render::{ColorBy, Compass, Error, Fit, Params, Rendered, Style, Theme, Unit, render};
 use glam::DVec2;
 
 fn draw(tree: &Tree, params: &Params) -> Rendered {
@@ -49,7 +49,7 @@ fn svg_has_a_path_for_each_branch_and_escapes_what_the_user_wrote() {
     let uses = document.descendants().filter(|n| n.has_tag_name("use")).count();
     assert_eq!(uses, branches.list().len());
     let shown = document.descendants().find(|n| n.has_tag_name("title")).and_then(|n| n.text());
-    assert_eq!(shown, Some("A <b> & \"c\" of \u{1F333}"));
+    assert_eq!(shown, Some("A <b> & \"c\"  of \u{1F333}"));
     for group in ["heading", "legend", "scale-bar", "root-mark"] {
         assert!(document.descendants().any(|n| n.attribute("id") == Some(group)), "{group}");
     }
@@ -117,14 +117,25 @@ fn the_pictures_do_not_depend_on_the_number_of_threads() {
 fn every_style_colour_and_theme_draws() {
     let tree = fern(9, 3, 1.0);
     let plain = draw(&tree, &quick()).png;
-    for color_by in
-        [ColorBy::BranchRadius, ColorBy::Generation, ColorBy::Branch, ColorBy::AngleLoss, ColorBy::LengthLoss]
-    {
+    for color_by in [
+        ColorBy::BranchRadius,
+        ColorBy::Generation,
+        ColorBy::Branch,
+        ColorBy::AngleLoss,
+        ColorBy::LengthLoss,
+        ColorBy::OrientationLoss,
+        ColorBy::Part,
+        ColorBy::Label,
+    ] {
         assert_ne!(draw(&tree, &Params { color_by, ..quick() }).png, plain, "{color_by:?}");
     }
     for params in [
         Params { style: Style::Line, ..quick() },
+        Params { style: Style::Ribbon, ..quick() },
         Params { theme: Theme::Dark, ..quick() },
+        Params { theme: Theme::Print, ..quick() },
+        Params { fit: Fit::Turned, ..quick() },
+        Params { aspect: Some(0.5), ..quick() },
         Params { width_scale: 2.0, ..quick() },
     ] {
         assert_ne!(draw(&tree, &params).png, plain);
@@ -217,14 +228,16 @@ fn what_cannot_be_drawn_is_refused_with_a_reason() {
     broken.positions_mm[3] = DVec2::new(1e300, 0.0);
     assert!(matches!(refused(&broken, &quick()), Error::Number { node: 3, .. }));
 
-    let error = refused(&flat(&tree), &Params { width_px: 16_000, ..quick() });
+    let error = refused(&flat(&tree), &Params { width_px: 16_000, aspect: Some(2.0), ..quick() });
     assert_eq!((error.code(), error.class()), ("E-RENDER-SIZE", Class::Limit));
-    assert!(error.to_string().contains("16000 ×"), "{error}");
+    assert!(error.to_string().contains("16000 × 32000"), "{error}");
 
     for (key, params) in [
         ("width_px", Params { width_px: 239, ..quick() }),
         ("width_scale", Params { width_scale: f64::NAN, ..quick() }),
         ("min_width_px", Params { min_width_px: 0.0, ..quick() }),
+        ("aspect", Params { aspect: Some(0.1), ..quick() }),
+        ("aspect", Params { aspect: Some(f64::NAN), ..quick() }),
         ("title", Params { title: Some("x".repeat(501)), ..quick() }),
     ] {
         let error = refused(&flat(&tree), &params);

@@ -14,6 +14,7 @@ mod points;
 
 use std::path::Path;
 
+use espalier_geom::math;
 use espalier_model::{Embedding, Grid, Mask, Tree, ViewHierarchy, swc};
 use espalier_render::PlanarMap;
 use glam::{DVec2, DVec3};
@@ -58,6 +59,8 @@ struct Opened {
 struct Picture {
     mm_per_px: f64,
     origin_px: DVec2,
+    /// The unit vector in the picture along which the plane's x axis lies, y up.
+    x_axis: DVec2,
 }
 
 impl Opened {
@@ -177,16 +180,20 @@ impl Picture {
         let across = after("plane_x_mm = (x + 0.5 - ")?;
         let origin_px = DVec2::new(number(&across)?, number(&after("plane_y_mm = (")?)?);
         let mm_per_px = number(across.split_once("* ")?.1)?;
-        Some(Self { mm_per_px, origin_px }).filter(|_| mm_per_px > 0.0 && origin_px.is_finite())
+        // A picture may show the whole turned, to fit its page.
+        let turn_deg = number(&after("turned by ")?)?;
+        let x_axis = math::unit_vector(turn_deg.to_radians());
+        Some(Self { mm_per_px, origin_px, x_axis }).filter(|_| mm_per_px > 0.0 && origin_px.is_finite())
     }
 
     /// The plane at a pixel counted from 0 at the picture's upper left corner; whole numbers are centres of pixels.
     fn plane(&self, pixel: DVec2) -> DVec2 {
         let [x, y] = (pixel + 0.5 - self.origin_px).to_array();
-        DVec2::new(x, -y) * self.mm_per_px
+        DVec2::new(self.x_axis.x, -self.x_axis.y).rotate(DVec2::new(x, -y)) * self.mm_per_px
     }
 
     fn pixel(&self, plane_mm: DVec2) -> DVec2 {
-        self.origin_px + DVec2::new(plane_mm.x, -plane_mm.y) / self.mm_per_px - 0.5
+        let turned = self.x_axis.rotate(plane_mm);
+        self.origin_px + DVec2::new(turned.x, -turned.y) / self.mm_per_px - 0.5
     }
 }
