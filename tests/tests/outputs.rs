@@ -180,7 +180,7 @@ fn a_label_map_on_another_grid_reaches_the_branches() {
     assert!(graph.contains("<data key=\"label_name\">left &amp; lower</data>"));
     // Where the files lie is nobody's business; what they hold is.
     let settings = fs::read_to_string(out.join("provenance/config.resolved.toml")).expect("settings");
-    assert!(settings.contains("labels = \"lobes.nii.gz\""), "{settings}");
+    assert!(settings.contains("labels = \"labels.nii.gz\""), "{settings}");
     assert!(fs::read_to_string(out.join("provenance/inputs.tsv")).expect("inputs").contains("\nlabels\t"));
 
     // A run from the middle refuses another label map; a missing one leaves nothing behind.

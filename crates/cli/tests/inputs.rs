@@ -43,7 +43,7 @@ fn labels_go_by_the_users_own_names() {
     let inputs = read(&folder, "out/provenance/inputs.tsv");
     assert_eq!(inputs.lines().filter(|line| line.starts_with("input\t")).count(), 2, "{inputs}");
     assert!(inputs.contains("input_labels\t"), "{inputs}");
-    assert!(read(&folder, "out/provenance/config.resolved.toml").contains("labels = \"names.ctbl\""));
+    assert!(read(&folder, "out/provenance/config.resolved.toml").contains("labels = \"input_labels.ctbl\""));
     // Again in the folder itself, which knows where the file lies.
     let (code, text) = said(&folder, &["volume", "out"]);
     assert!(code == Some(0) && text.contains("216 voxels"), "{text}");

@@ -8,7 +8,7 @@ use espalier_model::table::{Column, Table};
 use serde::Serialize;
 
 use crate::clock;
-use crate::config::Config;
+use crate::config::{Config, UNNAMED};
 use crate::error::Error;
 use crate::folder::{RunFolder, file_digest};
 use crate::side_file::SideFile;
@@ -169,7 +169,7 @@ pub(crate) fn write_run(
         version: 1,
         program: "espalier",
         program_version: env!("CARGO_PKG_VERSION"),
-        name: &config.name,
+        name: config.own_name().unwrap_or(UNNAMED),
         seed: config.seed,
         input: input.map_or_else(|| input_of_run(folder.path()), absolute),
         side_files: side_paths

@@ -4,11 +4,10 @@
 //! after a run that began in the middle, ended early, or failed.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use toml::{Table, Value};
 
-use crate::config::Config;
+use crate::config::{Config, UNNAMED};
 use crate::error::Error;
 use crate::folder::RunFolder;
 use crate::side_file::SideFile;
@@ -123,18 +122,28 @@ fn flatten(prefix: &str, table: &Table, keys: &mut BTreeMap<String, String>) {
     }
 }
 
-/// The config without what is of this machine: of the paths of files only their names.
+/// The config without what is of this machine or of a patient: of the paths of files only what kind of file they are,
+/// and no name that is only the input's. What the files hold, `provenance/inputs.tsv` tells by its digest.
 fn portable(config: &Config) -> Table {
     let mut portable = config.clone();
-    let name_alone = |path: &mut Option<String>| {
-        *path = path
-            .take()
-            .filter(|path| !path.is_empty())
-            .map(|path| Path::new(&path).file_name().unwrap_or_default().to_string_lossy().into_owned());
+    config.own_name().unwrap_or(UNNAMED).clone_into(&mut portable.name);
+    let kind_alone = |path: &mut Option<String>, role: &str| {
+        *path = path.take().filter(|path| !path.is_empty()).map(|path| format!("{role}{}", extension(&path)));
     };
-    name_alone(&mut portable.input.path);
-    SideFile::ALL.into_iter().for_each(|side| name_alone(side.slot(&mut portable)));
+    kind_alone(&mut portable.input.path, "input");
+    SideFile::ALL.into_iter().for_each(|side| kind_alone(side.slot(&mut portable), side.role()));
     toml::from_str(&portable.to_toml()).unwrap_or_default()
+}
+
+/// The end of a file's name that says what kind it is, with its dot; nothing where it is none that is known, since it may
+/// be a part of a name.
+fn extension(path: &str) -> &'static str {
+    const KNOWN: [&str; 17] = [
+        ".nii.gz", ".nii", ".hdr", ".img", ".nrrd", ".nhdr", ".mha", ".mhd", ".dcm", ".swc", ".vtp", ".vtk",
+        ".json", ".tsv", ".csv", ".txt", ".ctbl",
+    ];
+    let path = path.to_ascii_lowercase();
+    KNOWN.into_iter().find(|end| path.ends_with(end)).unwrap_or_default()
 }
 
 /// The first key at which two values differ, with both of them as text.

@@ -281,7 +281,7 @@ fn render(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let embedding = step.take(Artifacts::embedding)?;
     let comparison = step.take(Artifacts::comparison)?;
     let mut params = step.config.render.clone();
-    params.title.get_or_insert_with(|| step.config.name.clone());
+    params.title = params.title.or_else(|| step.config.own_name().map(str::to_owned));
     params.compass = figure::compass(params.compass, step.artifacts.is_of_scan);
     let made =
         espalier_render::render(&tree, &embedding, &views, &params).map_err(|error| step.failed(error))?;

@@ -72,6 +72,9 @@ impl Default for Config {
     }
 }
 
+/// The name in every result of a run that nobody has named.
+pub(crate) const UNNAMED: &str = "run";
+
 /// A config and the folder that its relative paths start from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
@@ -180,13 +183,14 @@ impl Config {
         let stem = file_name.split('.').next().unwrap_or_default();
         let name: String =
             stem.chars().map(|c| if is_name_character(c) { c } else { '_' }).take(100).collect();
-        if name.is_empty() { "run".to_owned() } else { name }
+        if name.is_empty() { UNNAMED.to_owned() } else { name }
     }
 
     /// The name of the run, unless it is only that of the input's file, which may be a patient's.
     pub(crate) fn own_name(&self) -> Option<&str> {
         let of_input = self.input.path.as_ref().map(|path| Self::name_of_input(Path::new(path)));
-        (of_input.as_ref() != Some(&self.name)).then_some(self.name.as_str())
+        let is_own = of_input.as_ref() != Some(&self.name) && self.name != UNNAMED;
+        is_own.then_some(self.name.as_str())
     }
 
     /// The config with every key, as TOML.

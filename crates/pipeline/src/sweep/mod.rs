@@ -127,7 +127,8 @@ pub fn sweep(request: &SweepRequest, events: &(dyn Fn(Event) + Sync)) -> Result<
 
 fn results(request: &SweepRequest, first: &Loaded, done: &[Combination]) -> Result<Files, Error> {
     let mut params = first.config.render.clone();
-    let title = params.title.get_or_insert_with(|| first.config.name.clone()).clone();
+    let own_name = first.config.own_name().unwrap_or("sweep");
+    let title = params.title.get_or_insert_with(|| own_name.to_owned()).clone();
     let figure = plot::draw(&title, &request.axes, done, &params)
         .map_err(|error| Error::stage(Stage::Render)(boxed(error)))?;
     Ok(vec![
