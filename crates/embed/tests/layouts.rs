@@ -242,7 +242,7 @@ fn json_and_tables() {
     let back = Embedding::from_json(&json, &tree).expect("our own file");
     assert_eq!(back.to_json(), json);
     assert_eq!(back.positions_mm, embedding.positions_mm);
-    assert!(json.starts_with("{\"format\":\"espalier-embedding\",\"version\":2,"));
+    assert!(json.starts_with("{\"format\":\"espalier-embedding\",\"version\":3,"));
 
     let smaller = random_tree(0, 59, 2.0, false, 3);
     let error = Embedding::from_json(&json, &smaller).expect_err("another tree");
@@ -250,7 +250,7 @@ fn json_and_tables() {
     let x = format!("{:?}", embedding.positions_mm[1].x);
     let off = json.replacen(&x, &format!("{x}00001"), 1);
     assert!(Embedding::from_json(&off, &tree).expect_err("not rounded").to_string().contains("not rounded"));
-    assert!(Embedding::from_json(&json.replacen("version\":2", "version\":3", 1), &tree).is_err());
+    assert!(Embedding::from_json(&json.replacen("version\":3", "version\":4", 1), &tree).is_err());
 
     let nodes = embedding.nodes_tsv(&tree);
     let lines: Vec<&str> = nodes.lines().collect();
