@@ -8,9 +8,9 @@ mod program;
 
 use std::fs;
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use program::{espalier, stderr};
+use program::{espalier, files_below, stderr};
 use slices::{SECRETS, Slice, stack, write};
 
 /// A folder `scan` of slices 2 mm apart, with names that are a patient's.
@@ -19,18 +19,6 @@ fn scan(slices: &[Slice]) -> tempfile::TempDir {
     fs::create_dir(folder.path().join("scan")).expect("writable");
     write(&folder.path().join("scan"), slices, |index| format!("DOE^JANE-{}.dcm", 9 - index));
     folder
-}
-
-fn files_below(folder: &Path) -> Vec<PathBuf> {
-    let (mut files, mut folders) = (Vec::new(), vec![folder.to_owned()]);
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(&folder).expect("folder") {
-            let path = entry.expect("entry").path();
-            if path.is_dir() { folders.push(path) } else { files.push(path) }
-        }
-    }
-    files.sort();
-    files
 }
 
 /// The bytes of a file, unpacked where it is compressed.

@@ -1,22 +1,16 @@
 //! From the scan to the map and back, as its user meets it.
 #![allow(clippy::expect_used, reason = "a test says what it expects")]
 
+mod program;
+
 use std::fs;
 use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 
+use program::espalier;
 use serde_json::Value;
 use tempfile::TempDir;
-
-fn espalier(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_espalier"))
-        .args(arguments)
-        .current_dir(folder)
-        .env_remove("ESPALIER_DATA")
-        .output()
-        .expect("the program starts")
-}
 
 fn text_of(folder: &Path, arguments: &[&str]) -> String {
     let output = espalier(folder, arguments);

@@ -5,9 +5,8 @@ mod program;
 
 use std::fs;
 use std::io::Read;
-use std::path::{Path, PathBuf};
 
-use program::{espalier, stderr};
+use program::{espalier, files_below, stderr};
 
 /// In the name of the folder, in that of the file, and with a number behind it in each text.
 const FOLDER: &str = "DOE^JANE~1947";
@@ -75,17 +74,6 @@ fn metaimage() -> Vec<u8> {
 fn swc() -> Vec<u8> {
     format!("# {TEXT}\n# PATIENT {TEXT}1\n1 1 0 0 0 1 -1 {TEXT}2\n2 3 0 -9 0 .9 1\n3 3 5 -16 3 .5 2\n4 3 -6 -15 -2 .5 2\n")
         .into_bytes()
-}
-
-fn files_below(folder: &Path) -> Vec<PathBuf> {
-    let (mut files, mut folders) = (Vec::new(), vec![folder.to_owned()]);
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(&folder).expect("folder") {
-            let path = entry.expect("entry").path();
-            if path.is_dir() { folders.push(path) } else { files.push(path) }
-        }
-    }
-    files
 }
 
 /// The bytes of a file, and everything in it that can be inflated: gzip, and streams of zlib in PNG, PDF and EXR.

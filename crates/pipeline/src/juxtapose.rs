@@ -21,13 +21,13 @@ use espalier_model::{
 use espalier_render::ChangeOf;
 
 use crate::artifacts::{Artifacts, Lookup, SOURCE_KEY, SOURCE_SCAN, SOURCE_TRACING};
-use crate::compare::{Files, Subject, figure, names};
+use crate::compare::{Files, Place, Subject, figure, names};
 use crate::config::{Config, Override};
 use crate::error::Error;
 use crate::event::Event;
 use crate::folder::RunFolder;
 use crate::methods::MethodWatch;
-use crate::run::{self, Request, Summary, boxed, in_pool};
+use crate::run::{Summary, boxed, in_pool};
 use crate::settings;
 use crate::stage::{Artifact, Stage};
 
@@ -89,7 +89,14 @@ pub fn juxtapose(
     let names = names(&request.subjects);
     let mut folders = Vec::new();
     for (subject, name) in request.subjects.iter().zip(&names) {
-        folders.push(folder_of(request, subject, name, events)?);
+        let place = Place {
+            out: request.out.join(name),
+            to: Stage::Tree,
+            threads: request.threads,
+            max_memory_bytes: request.max_memory_bytes,
+            data_dir: request.data_dir.clone(),
+        };
+        folders.push(subject.folder(place, events)?);
     }
     in_pool(request.threads, || {
         let runs = folders.iter().zip(names).map(|(folder, name)| read_run(request, folder, name));
@@ -103,30 +110,6 @@ pub fn juxtapose(
         let summary = Summary { out: request.out.clone(), highlights, digest: folder.seal()? };
         Ok(JuxtaposedRuns { table, summary })
     })
-}
-
-/// The run folder of a subject; a config is run up to its tree first.
-fn folder_of(
-    request: &JuxtaposeRequest,
-    subject: &Subject,
-    name: &str,
-    events: &(dyn Fn(Event) + Sync),
-) -> Result<PathBuf, Error> {
-    let loaded = match subject {
-        Subject::Run(folder) => return Ok(folder.clone()),
-        Subject::Config(loaded) => loaded.as_ref().clone(),
-    };
-    let run = Request {
-        loaded,
-        out: request.out.join(name),
-        from: None,
-        to: Some(Stage::Tree),
-        files: std::collections::BTreeMap::new(),
-        threads: request.threads,
-        max_memory_bytes: request.max_memory_bytes,
-        data_dir: request.data_dir.clone(),
-    };
-    run::run(&run, events).map(|summary| summary.out)
 }
 
 /// Reads a run folder up to its tree, every file checked against the folder's digests.

@@ -160,10 +160,14 @@ fn by_radius(tree: &Tree, radii_mm: &[[f64; 2]], params: &Params) -> Coloring {
 
 /// The octaves on either side of the mean that hold [`SHARE_IN_SCALE`] of the length.
 fn half_range(tree: &Tree, radii_mm: &[[f64; 2]], octaves: impl Fn(f64) -> f64) -> f64 {
-    let mut spread: Vec<(f64, f64)> = tree
+    let spread = tree
         .edges()
-        .flat_map(|(node, _)| radii_mm[node].map(|r| (octaves(r).abs(), 0.5 * tree.edge_length_mm(node))))
-        .collect();
+        .flat_map(|(node, _)| radii_mm[node].map(|r| (octaves(r).abs(), 0.5 * tree.edge_length_mm(node))));
+    value_at_share(spread.collect()).unwrap_or(HALF_RANGE[0]).clamp(HALF_RANGE[0], HALF_RANGE[1])
+}
+
+/// The value that [`SHARE_IN_SCALE`] of the length does not exceed, from values with their lengths.
+pub(crate) fn value_at_share(mut spread: Vec<(f64, f64)>) -> Option<f64> {
     spread.sort_by(|a, b| a.0.total_cmp(&b.0));
     let total: f64 = spread.iter().map(|&(_, length)| length).sum();
     let mut passed = 0.0;
@@ -171,7 +175,7 @@ fn half_range(tree: &Tree, radii_mm: &[[f64; 2]], octaves: impl Fn(f64) -> f64) 
         passed += length;
         passed >= SHARE_IN_SCALE * total
     });
-    at_share.map_or(HALF_RANGE[0], |&(octaves, _)| octaves).clamp(HALF_RANGE[0], HALF_RANGE[1])
+    at_share.map(|&(value, _)| value)
 }
 
 /// Ticks of a logarithmic bar from `low` over `mean` in the middle to `high`; `is_clipped` at either end.

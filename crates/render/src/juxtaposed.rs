@@ -14,7 +14,7 @@ use std::fmt::Write as _;
 use espalier_model::{Embedding, Fate, Juxtaposition, SharedNode, change_percent};
 use glam::DVec2;
 
-use crate::coloring::{Coloring, Scale, Tick};
+use crate::coloring::{Coloring, Scale, Tick, value_at_share};
 use crate::cone::{Ball, Cone, Joint};
 use crate::drawing::{Group, Mark};
 use crate::furniture::{self, Heading};
@@ -46,8 +46,6 @@ const LEAST_GAIN_BELOW: f64 = 1.5;
 const GHOST: f64 = 0.75;
 /// Ends of the scale, in percent; the first that holds what is to be seen.
 const ENDS_PERCENT: [f64; 5] = [10.0, 20.0, 30.0, 40.0, 60.0];
-/// The share of the length whose changes the scale must tell apart.
-const SHARE_IN_SCALE: f64 = 0.98;
 
 /// What the colours of the follow-up mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -189,20 +187,13 @@ fn changes_at(found: &Juxtaposition, change: ChangeOf, node: usize) -> [f64; 2] 
 /// The end of a scale that tells nearly all changes apart, and the narrowest place of each branch.
 fn end_percent(found: &Juxtaposition, change: ChangeOf, changes: &[[f64; 2]]) -> f64 {
     let known = |node: &usize| found.nodes[*node].fate == Fate::Matched && changes[*node][1].is_finite();
-    let mut spread: Vec<(f64, f64)> = (1..found.nodes.len())
+    let spread = (1..found.nodes.len())
         .filter(known)
-        .map(|node| (changes[node][1].abs(), found.shared.edge_length_mm(node)))
-        .collect();
-    spread.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let total: f64 = spread.iter().map(|&(_, length)| length).sum();
-    let mut passed = 0.0;
-    let at_share = spread.iter().find(|&&(_, length)| {
-        passed += length;
-        passed >= SHARE_IN_SCALE * total
-    });
+        .map(|node| (changes[node][1].abs(), found.shared.edge_length_mm(node)));
+    let at_share = value_at_share(spread.collect());
     let narrowest = found.of_fate(Fate::Matched).map(|row| row.narrowest_percent.abs());
     let narrowest = narrowest.filter(|percent| percent.is_finite() && change == ChangeOf::Radius);
-    let wanted = narrowest.fold(at_share.map_or(0.0, |&(percent, _)| percent), f64::max);
+    let wanted = narrowest.fold(at_share.unwrap_or(0.0), f64::max);
     let [.., last] = ENDS_PERCENT;
     ENDS_PERCENT.into_iter().find(|&end| end >= wanted).unwrap_or(last)
 }
@@ -319,9 +310,9 @@ impl Artist<'_> {
     /// Lines where radii would cover a panel several times over.
     fn style(&self, panels: &[Panel; 2]) -> Style {
         let is_thick = |panel: &Panel| {
-            let page = local(&panel.page);
+            let page = panel.page.panel();
             let drawn = self.edges(panel.tree, &page, Style::PseudoSurface);
-            raster::layers(size_of(&page), &drawn) > MAX_LAYERS
+            raster::layers(page.size(), &drawn) > MAX_LAYERS
         };
         if panels.iter().any(is_thick) { Style::Line } else { self.params.style }
     }
@@ -424,11 +415,11 @@ impl Artist<'_> {
     }
 
     fn draw(&self, panel: &Panel, style: Style, canvas: &mut Canvas) {
-        let page = local(&panel.page);
+        let page = panel.page.panel();
         let drawn = self.edges(panel.tree, &page, style);
         let kinship = self.kinship(&page);
         let raster = Raster::new(Job {
-            size: size_of(&page),
+            size: page.size(),
             drawn: &drawn,
             kinship: &kinship,
             palette: &self.coloring.palette,
@@ -550,21 +541,4 @@ struct Run {
     is_there: bool,
     /// From the node that it hangs from.
     nodes: Vec<usize>,
-}
-
-/// The page of a panel in the panel's own pixels.
-fn local(page: &Page) -> Page {
-    let [low, high] = page.area;
-    let size = (high - low).ceil().max(DVec2::ONE);
-    Page {
-        width: size.x as u32,
-        height: size.y as u32,
-        origin_px: page.origin_px - low,
-        area: [DVec2::ZERO, size],
-        ..*page
-    }
-}
-
-fn size_of(page: &Page) -> [usize; 2] {
-    [page.width as usize, page.height as usize]
 }

@@ -68,6 +68,24 @@ pub(crate) struct Pen {
 }
 
 impl Page {
+    /// Width and height in pixels.
+    pub(crate) fn size(&self) -> [usize; 2] {
+        [self.width as usize, self.height as usize]
+    }
+
+    /// The area of the tree as a page of its own, in its own pixels: a panel of several.
+    pub(crate) fn panel(&self) -> Self {
+        let [low, high] = self.area;
+        let size = (high - low).ceil().max(DVec2::ONE);
+        Self {
+            width: size.x as u32,
+            height: size.y as u32,
+            origin_px: self.origin_px - low,
+            area: [DVec2::ZERO, size],
+            ..*self
+        }
+    }
+
     /// The layout unit of a page of this width.
     pub(crate) fn unit_px(width: u32) -> f64 {
         (f64::from(width) / 100.0).max(LEAST_UNIT_PX)

@@ -267,10 +267,10 @@ impl Artist<'_> {
     /// All panels of a section become lines if the radii would cover one of them too often.
     fn thin_if_needed(&self, frames: &mut [Frame<'_>]) {
         let is_thick = |frame: &Frame<'_>| {
-            let (local, kinship) = (local(&frame.page), kinship(frame));
+            let (local, kinship) = (frame.page.panel(), kinship(frame));
             let page = Page { pen: Pen { style: Style::PseudoSurface, ..local.pen }, ..local };
             let drawn = sketch::edges(frame.tree, &frame.scene, &page, &frame.coloring, &kinship);
-            raster::layers(size_of(&page), &drawn) > MAX_LAYERS
+            raster::layers(page.size(), &drawn) > MAX_LAYERS
         };
         if self.params.style == Style::PseudoSurface && frames.iter().any(is_thick) {
             for frame in frames {
@@ -280,11 +280,11 @@ impl Artist<'_> {
     }
 
     fn draw(&self, frame: &Frame<'_>, canvas: &mut Canvas) {
-        let page = local(&frame.page);
+        let page = frame.page.panel();
         let kinship = kinship(frame);
         let drawn: Vec<Drawn> = sketch::edges(frame.tree, &frame.scene, &page, &frame.coloring, &kinship);
         let raster = Raster::new(Job {
-            size: size_of(&page),
+            size: page.size(),
             drawn: &drawn,
             kinship: &kinship,
             palette: &frame.coloring.palette,
@@ -338,23 +338,6 @@ fn strong(mark: Mark) -> Mark {
         }
         other => other,
     }
-}
-
-/// The page of a panel in the panel's own pixels.
-fn local(page: &Page) -> Page {
-    let [low, high] = page.area;
-    let size = (high - low).ceil().max(DVec2::ONE);
-    Page {
-        width: size.x as u32,
-        height: size.y as u32,
-        origin_px: page.origin_px - low,
-        area: [DVec2::ZERO, size],
-        ..*page
-    }
-}
-
-fn size_of(page: &Page) -> [usize; 2] {
-    [page.width as usize, page.height as usize]
 }
 
 fn kinship(frame: &Frame<'_>) -> Kinship {

@@ -52,6 +52,37 @@ pub enum Subject {
     Config(Box<Loaded>),
 }
 
+/// Where and how far a config is run.
+pub(crate) struct Place {
+    pub(crate) out: PathBuf,
+    pub(crate) to: Stage,
+    pub(crate) threads: Option<usize>,
+    pub(crate) max_memory_bytes: u64,
+    pub(crate) data_dir: Option<PathBuf>,
+}
+
+impl Subject {
+    /// The run folder; a config is run first.
+    pub(crate) fn folder(&self, place: Place, events: &(dyn Fn(Event) + Sync)) -> Result<PathBuf, Error> {
+        let loaded = match self {
+            Self::Run(folder) => return Ok(folder.clone()),
+            Self::Config(loaded) => loaded.as_ref().clone(),
+        };
+        let Place { out, to, threads, max_memory_bytes, data_dir } = place;
+        let run = Request {
+            loaded,
+            out,
+            from: None,
+            to: Some(to),
+            files: std::collections::BTreeMap::new(),
+            threads,
+            max_memory_bytes,
+            data_dir,
+        };
+        run::run(&run, events).map(|summary| summary.out)
+    }
+}
+
 /// What a comparison came to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Compared {
@@ -84,7 +115,14 @@ pub fn compare(request: &CompareRequest, events: &(dyn Fn(Event) + Sync)) -> Res
     let names = names(&request.subjects);
     let mut folders = Vec::new();
     for (subject, name) in request.subjects.iter().zip(&names) {
-        folders.push(folder_of(request, subject, name, events)?);
+        let place = Place {
+            out: request.out.join(name),
+            to: Stage::Embed,
+            threads: request.threads,
+            max_memory_bytes: request.max_memory_bytes,
+            data_dir: request.data_dir.clone(),
+        };
+        folders.push(subject.folder(place, events)?);
     }
     in_pool(request.threads, || {
         let runs = folders.iter().zip(names).map(|(folder, name)| read_run(request, folder, name));
@@ -116,30 +154,6 @@ pub(crate) fn names(subjects: &[Subject]) -> Vec<String> {
         names.extend(free.into_iter().find(|candidate| !names.contains(candidate)));
     }
     names
-}
-
-/// The run folder of a subject; a config is run first.
-fn folder_of(
-    request: &CompareRequest,
-    subject: &Subject,
-    name: &str,
-    events: &(dyn Fn(Event) + Sync),
-) -> Result<PathBuf, Error> {
-    let loaded = match subject {
-        Subject::Run(folder) => return Ok(folder.clone()),
-        Subject::Config(loaded) => loaded.as_ref().clone(),
-    };
-    let run = Request {
-        loaded,
-        out: request.out.join(name),
-        from: None,
-        to: Some(Stage::Embed),
-        files: std::collections::BTreeMap::new(),
-        threads: request.threads,
-        max_memory_bytes: request.max_memory_bytes,
-        data_dir: request.data_dir.clone(),
-    };
-    run::run(&run, events).map(|summary| summary.out)
 }
 
 /// Reads a run folder, every file checked against the folder's digests.
