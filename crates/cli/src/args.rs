@@ -289,12 +289,19 @@ pub(crate) struct VerifyArguments {
 
 const PROFILE_HELP: &str = "\
 Prints the rows of profiles.tsv on the way from the root, each node once, with its point in RAS+ mm: path length, radius,
-the radius before and after, and by how much it falls short of that.
+the radius before and after, and by how much it falls short of that. With --plot it draws them instead: the radius against
+the path length, borders of branches, mean and standard deviation of each generation on the way, the narrow places of
+stenoses.tsv, and the narrowest place with its percentage.
+
+Narrowing is diameter stenosis, 100 (1 - radius / reference), as in NASCET. NASCET's reference is the vessel beyond the
+narrow place; ours is the smaller of the largest radii within ten radii before and after, which is the one beyond wherever
+the vessel tapers. Inside of a fork there is no reference.
 
 Examples:
   espalier profile out/airway --branch 17               to the end of a branch, as numbered in branches.tsv
   espalier profile out/airway --node 138                to a node, such as a tip, as numbered in nodes.tsv
-  espalier profile out/airway --to=-32.7,-168.8,-161.8  to the node nearest to a point";
+  espalier profile out/airway --to=-32.7,-168.8,-161.8  to the node nearest to a point
+  espalier profile out/airway --branch 17 --plot way.svg --set render.theme=dark";
 
 /// `espalier profile`.
 #[derive(Debug, Args)]
@@ -305,6 +312,9 @@ pub(crate) struct ProfileArguments {
     pub(crate) folder: PathBuf,
     #[command(flatten)]
     pub(crate) place: PlaceArguments,
+    /// Draw the way into this file, .svg or .png; render.theme, render.width_px, render.unit and render.title apply
+    #[arg(long, value_name = "FILE")]
+    pub(crate) plot: Option<PathBuf>,
 }
 
 /// Where the way leads: one of these.

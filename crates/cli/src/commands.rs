@@ -11,7 +11,7 @@ use espalier_model::Diagnose;
 use espalier_model::diagnose::Class;
 use espalier_pipeline::{
     Align, Artifact, ChangeOf, CompareRequest, Config, Error, JuxtaposeParams, JuxtaposeRequest, Loaded,
-    Override, Request, SideFile, Space, Stage, Subject, Summary, SweepRequest, WayTo,
+    Override, PlotRequest, Plotted, Request, SideFile, Space, Stage, Subject, Summary, SweepRequest, WayTo,
 };
 
 use crate::args::{
@@ -41,7 +41,7 @@ pub(crate) fn execute(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Render(stage) => run_stage(arguments, stage, Stage::Render)?,
         Command::Report(stage) => run_stage(arguments, stage, Stage::Report)?,
         Command::Verify(verify) => return verify_folder(arguments, verify),
-        Command::Profile(profile) => return print_profile(profile),
+        Command::Profile(profile) => return print_profile(arguments, profile),
         Command::Locate(locate) => return print_located(arguments, locate),
     };
     for file in &summary.highlights {
@@ -65,14 +65,40 @@ fn verify_folder(arguments: &Arguments, verify: &VerifyArguments) -> anyhow::Res
     Ok(verification.verdict()?)
 }
 
-/// Prints the calibre on the way to a place.
-fn print_profile(profile: &ProfileArguments) -> anyhow::Result<()> {
+/// Prints the calibre on the way to a place, or draws it.
+fn print_profile(arguments: &Arguments, profile: &ProfileArguments) -> anyhow::Result<()> {
     let PlaceArguments { node, branch, to } = profile.place;
     let to_point = to.map(|point| WayTo::Point(point.into()));
     let way_to = node.map(WayTo::Node).or(branch.map(WayTo::Branch)).or(to_point);
     let way_to = way_to.ok_or_else(|| anyhow!("say where to: --node, --branch or --to"))?;
+    if let Some(plot) = &profile.plot {
+        let request = PlotRequest {
+            folder: profile.folder.clone(),
+            way_to,
+            plot: plot.clone(),
+            overrides: arguments.common.overrides.clone(),
+        };
+        let plotted = espalier_pipeline::plot_profile(&request)?;
+        progress::result(&narrowest_line(&plotted));
+        progress::result(&plot.display().to_string());
+        return Ok(());
+    }
     progress::result(espalier_pipeline::profile(&profile.folder, way_to)?.trim_end());
     Ok(())
+}
+
+fn narrowest_line(plotted: &Plotted) -> String {
+    let Some(place) = &plotted.narrowest else { return "nowhere narrower than its reference".to_owned() };
+    format!(
+        "narrowest {:.1} % at {:.4} mm from the root, branch {}, node {}: radius {:.4} mm of {:.4}{}",
+        place.narrowing_percent,
+        place.from_root_mm,
+        place.branch,
+        place.node,
+        place.radius_mm,
+        place.reference_radius_mm,
+        if plotted.is_listed { "" } else { " (not listed in stenoses.tsv)" }
+    )
 }
 
 /// Prints where points lie on both sides.

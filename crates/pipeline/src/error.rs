@@ -133,6 +133,18 @@ pub enum Error {
         /// How many there are.
         n_there: usize,
     },
+    /// A plot in a format that there is not.
+    #[error("--plot {path}: a plot is an .svg or a .png", path = path.display())]
+    PlotFormat {
+        /// The file asked for.
+        path: PathBuf,
+    },
+    /// A file that would be written over a result of a run.
+    #[error("{path} is a result of the run, which would be overwritten", path = path.display())]
+    ResultInTheWay {
+        /// The file asked for.
+        path: PathBuf,
+    },
     /// A text that is no point.
     #[error("{source_name}{cause}", source_name = source_name.as_ref().map(|name| format!("{name}: ")).unwrap_or_default())]
     Point {
@@ -282,6 +294,7 @@ impl Diagnose for Error {
             Self::Stage { cause, .. } | Self::File { cause, .. } => cause.code(),
             Self::MissingArtifact { .. } => "E-RUN-MISSING-FILE",
             Self::NoSuchPlace { .. } => "E-PROFILE-PLACE",
+            Self::PlotFormat { .. } | Self::ResultInTheWay { .. } => "E-PROFILE-PLOT",
             Self::Point { cause, .. } => cause.code(),
             Self::NoSuchSpace { .. } => "E-LOCATE-SPACE",
             Self::NoRun { .. } => "E-COMPARE-NO-RUN",
@@ -313,6 +326,8 @@ impl Diagnose for Error {
             Self::Point { cause, .. } => cause.class(),
             Self::NoSuchStage { .. }
             | Self::NoSuchPlace { .. }
+            | Self::PlotFormat { .. }
+            | Self::ResultInTheWay { .. }
             | Self::NoSuchSpace { .. }
             | Self::EmptyRange { .. }
             | Self::Input { .. }
@@ -343,6 +358,8 @@ impl Diagnose for Error {
             Self::Unverified { .. } => "use none of it; make it again with espalier run".to_owned(),
             Self::Certificate { .. } => "make the embedding again with espalier embed".to_owned(),
             Self::NoSuchPlace { .. } => "branches.tsv has the branches, nodes.tsv the nodes".to_owned(),
+            Self::PlotFormat { .. } => "name it with one of these endings".to_owned(),
+            Self::ResultInTheWay { .. } => "choose another name for the plot".to_owned(),
             Self::Point { cause, .. } => cause.hint(),
             Self::NoSuchSpace { .. } => "give points in RAS+ mm, with --lps in LPS+ mm, or on the map in mm".to_owned(),
             Self::NoRun { .. } => "run it with this version, at least up to --to embed".to_owned(),

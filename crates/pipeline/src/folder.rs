@@ -102,14 +102,16 @@ impl RunFolder {
 
     /// Writes a file that is not a result (a log, a time), whole or not at all.
     pub(crate) fn write_aside(&self, relative: &str, bytes: &[u8]) -> Result<(), Error> {
-        let path = self.path.join(relative);
-        let parent = path.parent().unwrap_or(&self.path);
-        fs::create_dir_all(parent).map_err(|source| Error::Create { path: parent.to_owned(), source })?;
-        let write = |source| Error::Write { path: path.clone(), source };
-        let mut file =
-            AtomicWriteFile::open(&path).map_err(|source| Error::Create { path: path.clone(), source })?;
-        file.write_all(bytes).map_err(write)?;
-        file.commit().map_err(write)
+        write_file(&self.path.join(relative), bytes)
+    }
+
+    /// Whether a path is that of a result file of this folder.
+    pub(crate) fn has_result_at(&self, path: &Path) -> bool {
+        let (Ok(folder), Ok(path)) = (fs::canonicalize(&self.path), fs::canonicalize(path)) else {
+            return false;
+        };
+        let relative = path.strip_prefix(folder).ok().and_then(Path::to_str);
+        relative.is_some_and(|relative| self.digests.contains_key(relative))
     }
 
     /// Checks every file that `SHA256SUMS` names against its digest.
@@ -163,6 +165,18 @@ impl RunFolder {
         self.write_aside(DIGEST_FILE, text.as_bytes())?;
         Ok(hex_digest(text.as_bytes()))
     }
+}
+
+/// Writes a file, whole or not at all, and the folder that it lies in.
+pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
+        fs::create_dir_all(parent).map_err(|source| Error::Create { path: parent.to_owned(), source })?;
+    }
+    let write = |source| Error::Write { path: path.to_owned(), source };
+    let mut file =
+        AtomicWriteFile::open(path).map_err(|source| Error::Create { path: path.to_owned(), source })?;
+    file.write_all(bytes).map_err(write)?;
+    file.commit().map_err(write)
 }
 
 fn is_absent(error: &io::Error) -> bool {

@@ -15,7 +15,7 @@
 //! | the page of a run: what it is made from | `page` |
 //! | what the columns of the tables mean | `dictionary` |
 //! | a point of the scan on the map, and back | [`mod@locate`] |
-//! | the calibre on the way to a place | [`profile()`] |
+//! | the calibre on the way to a place, as a table or a plot | [`profile()`], [`plot_profile`] |
 //! | a run folder held against itself | [`verify()`] |
 //!
 //! **Architecture Invariant:** a stage is handed what its predecessor *wrote*, as it would be read back: a run
@@ -58,7 +58,7 @@ pub use event::Event;
 pub use juxtapose::{JuxtaposeRequest, JuxtaposedRuns, juxtapose};
 pub use locate::{Given, Located, Space, locate, read_point, read_points};
 pub use phantom::make_phantom;
-pub use profile::{WayTo, profile};
+pub use profile::{PlotRequest, Plotted, WayTo, plot_profile, profile};
 pub use provenance::{input_of_run, side_file_of_run};
 pub use run::{Request, Summary, run};
 pub use settings::Difference;

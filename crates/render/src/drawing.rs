@@ -34,6 +34,15 @@ pub(crate) enum Mark {
         /// Its colour.
         color: Rgb,
     },
+    /// A bent line through at least two points, with round corners.
+    Bent {
+        /// Its points.
+        points: Vec<DVec2>,
+        /// Width in pixels.
+        width_px: f64,
+        /// Its colour.
+        color: Rgb,
+    },
     /// An upright colour bar, value 0 at the bottom.
     Bar {
         /// Its upper left corner.
@@ -66,6 +75,12 @@ impl Mark {
                 [DVec2::new(left, at.y - size_px), DVec2::new(left + width, at.y + 0.3 * size_px)]
             }
             Self::Line { from, to, width_px, .. } => [from.min(*to) - *width_px, from.max(*to) + *width_px],
+            Self::Bent { points, width_px, .. } => {
+                let first = points.first().copied().unwrap_or_default();
+                let [low, high] =
+                    points.iter().fold([first; 2], |[low, high], &at| [low.min(at), high.max(at)]);
+                [low - *width_px, high + *width_px]
+            }
             Self::Bar { corner, size, .. } => [*corner, *corner + *size],
             Self::Ring { center, radius_px, width_px, .. } => {
                 [*center - (radius_px + width_px), *center + (radius_px + width_px)]

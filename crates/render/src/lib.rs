@@ -10,7 +10,7 @@
 //! | 5 | `sketch`, `cone`, `kinship` | edges as round cones in pixels |
 //! | 6 | `raster`, `samples`, `shade` | the pixels |
 //! | 7 | `paint`, `svg`, `outline`, `layers` | the files |
-//! | 8 | `side_by_side`, `tiling`, `parts`; `juxtaposed`; `chart`, `convergence` | several layouts in one figure; two trees on one map; charts of numbers |
+//! | 8 | `side_by_side`, `tiling`, `parts`; `juxtaposed`; `chart`, `convergence`, `profile` | several layouts in one figure; two trees on one map; charts of numbers |
 //!
 //! **Source** section 4.1 of [Hu2022].
 
@@ -53,6 +53,7 @@ mod chart;
 mod convergence;
 mod juxtaposed;
 mod parts;
+mod profile;
 mod side_by_side;
 mod tiling;
 
@@ -76,6 +77,7 @@ use page::{Needs, Page, Pen};
 use paint::Canvas;
 use palette::PageColors;
 pub use params::{ColorBy, Compass, Fit, Params, Style, Theme, Unit};
+pub use profile::{Stretch, Way, profile};
 use raster::{Drawn, Job, Pixel, Raster};
 use scene::Scene;
 pub use side_by_side::{Panel, Section, SideBySide, side_by_side};

@@ -109,6 +109,16 @@ fn draw(target: &mut PixmapMut<'_>, mark: &Mark, face: &Face) {
                 stroke(target, &path, *width_px as f32, *color);
             }
         }
+        Mark::Bent { points, width_px, color } => {
+            let mut builder = PathBuilder::new();
+            for (idx, at) in points.iter().enumerate() {
+                let (x, y) = (at.x as f32, at.y as f32);
+                if idx == 0 { builder.move_to(x, y) } else { builder.line_to(x, y) }
+            }
+            if let Some(path) = builder.finish() {
+                stroke(target, &path, *width_px as f32, *color);
+            }
+        }
         Mark::Bar { corner, size, palette } => {
             let n_bands = if palette.is_continuous { size.y as usize } else { palette.len() }.max(1);
             let band = size.y / n_bands as f64;

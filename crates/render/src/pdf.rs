@@ -285,6 +285,12 @@ impl Ink<'_> {
                 self.stroke(*color, *width_px);
                 self.content.move_to(from.x as f32, from.y as f32).line_to(to.x as f32, to.y as f32).stroke();
             }
+            Mark::Bent { points, width_px, color } => {
+                self.stroke(*color, *width_px);
+                let places: Vec<(DVec2, f64)> = points.iter().map(|&at| (at, 0.0)).collect();
+                self.path(&polyline(&places));
+                self.content.stroke();
+            }
             Mark::Ring { center, radius_px, width_px, color } => {
                 self.stroke(*color, *width_px);
                 self.path(&disc(*center, *radius_px));

@@ -215,6 +215,16 @@ fn write_mark(out: &mut String, mark: &Mark) {
             to.y,
             hex(*color)
         ),
+        Mark::Bent { points, width_px, color } => {
+            let places: Vec<String> = points.iter().map(|at| format!("{:.2},{:.2}", at.x, at.y)).collect();
+            writeln!(
+                out,
+                "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{width_px:.2}\" \
+                 stroke-linejoin=\"round\"/>",
+                places.join(" "),
+                hex(*color)
+            )
+        }
         Mark::Bar { corner, size, palette } => {
             write_bar(out, [*corner, *size], palette);
             Ok(())
