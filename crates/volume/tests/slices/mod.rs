@@ -96,11 +96,11 @@ impl Slice {
             (0x0028_1053, "DS", decimals(&[self.slope])),
             (0x7FE0_0010, "OW", self.values.iter().flat_map(|value| value.to_le_bytes()).collect()),
         ];
-        for more in &self.more {
-            elements.retain(|element| element.0 != more.0);
-            elements.push(more.clone());
-        }
+        elements.extend(self.more.iter().cloned());
+        // Of several with one tag, the last.
+        elements.reverse();
         elements.sort_by_key(|element| element.0);
+        elements.dedup_by_key(|element| element.0);
         elements
             .into_iter()
             .flat_map(|(tag, representation, value)| element(tag, representation, value))
@@ -113,14 +113,15 @@ fn preamble(syntax: &[u8]) -> Vec<u8> {
     [vec![0; 128], b"DICM".to_vec(), element(0x0002_0010, "UI", syntax.to_vec())].concat()
 }
 
-fn element(tag: u32, representation: &str, mut value: Vec<u8>) -> Vec<u8> {
+/// An element with an explicit representation.
+pub(crate) fn element(tag: u32, representation: &str, mut value: Vec<u8>) -> Vec<u8> {
     if value.len() % 2 == 1 {
         value.push(if representation == "UI" { 0 } else { b' ' });
     }
     let mut bytes = ((tag >> 16) as u16).to_le_bytes().to_vec();
     bytes.extend((tag as u16).to_le_bytes());
     bytes.extend(representation.as_bytes());
-    if matches!(representation, "OW" | "OB" | "SQ" | "UN") {
+    if matches!(representation, "OW" | "OB" | "SQ" | "UN" | "UC" | "UR" | "UT") {
         bytes.extend([0, 0]);
         bytes.extend((value.len() as u32).to_le_bytes());
     } else {
