@@ -6,9 +6,10 @@ pub mod peer_ends;
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 use espalier_model::{Embedding, Tree, swc};
-use espalier_pipeline::{Config, Error, Loaded, Override, Request, Stage, Summary};
+use espalier_pipeline::{Config, Error, Event, Loaded, Override, Request, Stage, Summary};
 
 /// The folder of real data; `None`, and a line that says so, where `ESPALIER_DATA` is not set.
 ///
@@ -63,7 +64,23 @@ pub fn run_range(
     overrides: &[Override],
     (from, to): (Option<Stage>, Option<Stage>),
 ) -> Result<Summary, Error> {
-    espalier_pipeline::run(&Request { from, to, ..request(source, out, overrides, 2)? }, &|_| {})
+    // Done in any case: what stands already would be kept.
+    let request = Request { from, to, force: true, ..request(source, out, overrides, 2)? };
+    espalier_pipeline::run(&request, &|_| {})
+}
+
+/// As [`run`] on two threads, with the stages that were done; the others had results that stand.
+///
+/// # Errors
+/// As the run's.
+pub fn run_seen(source: &Path, out: &Path, overrides: &[Override]) -> Result<(Summary, Vec<Stage>), Error> {
+    let done = Mutex::new(Vec::new());
+    let summary = espalier_pipeline::run(&request(source, out, overrides, 2)?, &|event| {
+        if let (Event::Finished { stage, .. }, Ok(mut done)) = (event, done.lock()) {
+            done.push(stage);
+        }
+    })?;
+    Ok((summary, done.into_inner().unwrap_or_default()))
 }
 
 fn request(source: &Path, out: &Path, overrides: &[Override], threads: usize) -> Result<Request, Error> {
@@ -81,6 +98,7 @@ fn request(source: &Path, out: &Path, overrides: &[Override], threads: usize) ->
         from: None,
         to: None,
         files: std::collections::BTreeMap::new(),
+        force: false,
         threads: Some(threads),
         max_memory_bytes: 4 << 30,
         data_dir: None,

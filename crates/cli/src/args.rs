@@ -72,6 +72,9 @@ pub(crate) struct Common {
     /// Resample a tilted, uneven or incomplete DICOM series to an even grid; the same as --set input.resample=true
     #[arg(long, global = true)]
     pub(crate) resample: bool,
+    /// Do stages again also where their results stand: made from the same files and settings, and not altered since
+    #[arg(long, global = true)]
+    pub(crate) force: bool,
     /// Threads to use [default: one per core]; no result depends on it
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
@@ -160,6 +163,9 @@ pub(crate) struct RunArguments {
     /// End after this stage
     #[arg(long, value_name = "STAGE", value_parser = parse_stage)]
     pub(crate) to: Option<Stage>,
+    /// Do nothing; say which stages would be done, and why
+    #[arg(long)]
+    pub(crate) dry_run: bool,
 }
 
 const JUXTAPOSE_HELP: &str = "\

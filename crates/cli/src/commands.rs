@@ -11,7 +11,8 @@ use espalier_model::Diagnose;
 use espalier_model::diagnose::Class;
 use espalier_pipeline::{
     Align, Artifact, ChangeOf, CompareRequest, Config, Error, JuxtaposeParams, JuxtaposeRequest, Loaded,
-    Override, PlotRequest, Plotted, Request, SideFile, Space, Stage, Subject, Summary, SweepRequest, WayTo,
+    Override, Plan, PlotRequest, Plotted, Reason, Request, SideFile, Space, Stage, Subject, Summary,
+    SweepRequest, WayTo,
 };
 
 use crate::args::{
@@ -27,6 +28,7 @@ const FALLBACK_MEMORY_BYTES: u64 = 4 << 30;
 /// Does what the arguments say.
 pub(crate) fn execute(arguments: &Arguments) -> anyhow::Result<()> {
     let summary = match &arguments.command {
+        Command::Run(run) if run.dry_run => return print_plan(arguments, run),
         Command::Run(run) => run_pipeline(arguments, run)?,
         Command::Compare(compare) => run_compare(arguments, compare)?,
         Command::Juxtapose(juxtapose) => run_juxtapose(arguments, juxtapose)?,
@@ -163,10 +165,26 @@ pub(crate) fn report_failure(error: &anyhow::Error) -> ExitCode {
 }
 
 fn run_pipeline(arguments: &Arguments, run: &RunArguments) -> anyhow::Result<Summary> {
+    perform(arguments, &pipeline_request(arguments, run)?)
+}
+
+fn pipeline_request(arguments: &Arguments, run: &RunArguments) -> anyhow::Result<Request> {
     let loaded = load(&run.config_or_input, &arguments.common.overrides)?;
     let out = run.out.clone().unwrap_or_else(|| espalier_pipeline::run::default_folder(&loaded.config));
-    let request = Request { from: run.from, to: run.to, ..request(arguments, loaded, out) };
-    perform(arguments, &request)
+    Ok(Request { from: run.from, to: run.to, ..request(arguments, loaded, out) })
+}
+
+/// Prints which stages a run would do, and why.
+fn print_plan(arguments: &Arguments, run: &RunArguments) -> anyhow::Result<()> {
+    for Plan { stage, reason } in espalier_pipeline::plan(&pipeline_request(arguments, run)?)? {
+        let text = match reason {
+            None => "kept".to_owned(),
+            Some(reason @ Reason::After { .. }) => format!("to do if that changes: {reason}"),
+            Some(reason) => format!("to do: {reason}"),
+        };
+        progress::result(&format!("{stage:<9} {text}"));
+    }
+    Ok(())
 }
 
 fn run_compare(arguments: &Arguments, compare: &CompareArguments) -> anyhow::Result<Summary> {
@@ -338,6 +356,7 @@ fn request(arguments: &Arguments, loaded: Loaded, out: PathBuf) -> Request {
         from: None,
         to: None,
         files: BTreeMap::new(),
+        force: arguments.common.force,
         threads: arguments.common.threads.map(usize::from),
         max_memory_bytes: arguments.common.max_memory.unwrap_or_else(half_of_memory),
         data_dir: data_dir(),

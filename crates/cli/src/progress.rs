@@ -45,8 +45,10 @@ impl Progress {
     }
 
     pub(crate) fn show(&self, event: Event) {
-        if let (true, Event::Started { .. } | Event::Progress { .. } | Event::Finished { .. }) =
-            (self.is_quiet, &event)
+        if let (
+            true,
+            Event::Started { .. } | Event::Progress { .. } | Event::Finished { .. } | Event::Kept { .. },
+        ) = (self.is_quiet, &event)
         {
             return;
         }
@@ -75,6 +77,10 @@ impl Progress {
             Event::Finished { stage, seconds, line: text } => {
                 finish(&mut bar);
                 line(&format!("{stage:<9}{seconds:>6.1} s  {text}"));
+            }
+            Event::Kept { stage, line: text } => {
+                finish(&mut bar);
+                line(&format!("{stage:<9}    kept  {text}"));
             }
             Event::Combination { done, total, line: text } => {
                 finish(&mut bar);

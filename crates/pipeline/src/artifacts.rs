@@ -16,19 +16,16 @@ use espalier_tree::LabelMap;
 use espalier_volume::Orientation;
 use glam::DVec3;
 
-use crate::config::{Input, Unit};
+use crate::config::{Input, Source, Unit};
 use crate::error::Error;
 use crate::folder::RunFolder;
 use crate::side_file::SideFile;
-use crate::stage::{Artifact, Stage};
+use crate::stage::{Artifact, DROPPED_FILE, Stage};
 
 /// The header key of `tree.swc` that says what the tree was made from, and what it says.
 pub(crate) const SOURCE_KEY: &str = "source";
 pub(crate) const SOURCE_SCAN: &str = "scan";
 pub(crate) const SOURCE_TRACING: &str = "tracing";
-
-/// Where the `volume` stage leaves its part of the topology ledger.
-const DROPPED_FILE: &str = "stages/01-volume/dropped.tsv";
 
 /// The hand-over data of a run.
 #[derive(Default)]
@@ -66,6 +63,13 @@ pub(crate) struct Lookup<'a> {
 }
 
 impl Artifacts {
+    /// Whether the tree comes from a traced one. A mask named by the user goes before the config's source.
+    pub(crate) fn is_traced(&self, source: &Source) -> bool {
+        let named = |artifact| self.files.contains_key(&artifact);
+        named(Artifact::Traced)
+            || (matches!(source, Source::PhantomTree(_) | Source::Tree(_)) && !named(Artifact::Mask))
+    }
+
     /// The mask that the stage `volume` makes of the scan, with what its reader had to say.
     pub(crate) fn segmented(
         &self,

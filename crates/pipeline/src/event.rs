@@ -29,7 +29,7 @@ pub enum Event {
         /// The stage.
         stage: Stage,
         /// Its code.
-        code: &'static str,
+        code: String,
         /// The place and the fact.
         message: String,
     },
@@ -40,6 +40,13 @@ pub enum Event {
         /// How long it took.
         seconds: f64,
         /// What it did, as a phrase.
+        line: String,
+    },
+    /// A stage has nothing to do: its results are in place.
+    Kept {
+        /// The stage.
+        stage: Stage,
+        /// What it did when they were made, as a phrase.
         line: String,
     },
     /// A combination of a sweep is done.

@@ -1,9 +1,10 @@
 //! The run folder: atomic files, digests, one lock.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use atomic_write_file::AtomicWriteFile;
 use sha2::{Digest, Sha256};
@@ -18,6 +19,8 @@ pub(crate) struct RunFolder {
     path: PathBuf,
     /// What `SHA256SUMS` says, by file.
     digests: BTreeMap<String, String>,
+    /// The result files that have been read since they were last asked for.
+    reads: Mutex<BTreeSet<String>>,
     /// The folders that this run made, the innermost first.
     made: Vec<PathBuf>,
     /// The system releases the lock with the handle, however the process ends. None for a folder that is only read.
@@ -43,7 +46,7 @@ impl RunFolder {
             Err(TryLockError::Error(source)) => return Err(create(source)),
         }
         let digests = read_digests(&path.join(DIGEST_FILE));
-        Ok(Self { path: path.to_owned(), digests, made, _lock: Some(lock) })
+        Ok(Self { path: path.to_owned(), digests, reads: Mutex::default(), made, _lock: Some(lock) })
     }
 
     /// A folder to read from, without a lock: nothing is written to it.
@@ -51,6 +54,7 @@ impl RunFolder {
         Self {
             path: path.to_owned(),
             digests: read_digests(&path.join(DIGEST_FILE)),
+            reads: Mutex::default(),
             made: Vec::new(),
             _lock: None,
         }
@@ -74,6 +78,41 @@ impl RunFolder {
         self.write_aside(relative, bytes)?;
         self.digests.insert(relative.to_owned(), hex_digest(bytes));
         Ok(())
+    }
+
+    /// The digest that the folder has for a file.
+    pub(crate) fn digest(&self, relative: &str) -> Option<&String> {
+        self.digests.get(relative)
+    }
+
+    /// The digest of a file as it lies there now; none if there is none.
+    pub(crate) fn digest_if_there(&self, relative: &str) -> Result<Option<String>, Error> {
+        let path = self.path.join(relative);
+        match file_digest(&path) {
+            Ok((_, digest)) => Ok(Some(digest)),
+            Err(source) if is_absent(&source) => Ok(None),
+            Err(source) => Err(Error::Read { path, source }),
+        }
+    }
+
+    /// The bytes of a file as it lies there now, unchecked; none if there is none.
+    pub(crate) fn bytes_if_there(&self, relative: &str) -> Result<Option<Vec<u8>>, Error> {
+        let path = self.path.join(relative);
+        match fs::read(&path) {
+            Ok(bytes) => Ok(Some(bytes)),
+            Err(source) if is_absent(&source) => Ok(None),
+            Err(source) => Err(Error::Read { path, source }),
+        }
+    }
+
+    /// Vouches for files that lie there already and were found to have these digests.
+    pub(crate) fn adopt(&mut self, files: impl IntoIterator<Item = (String, String)>) {
+        self.digests.extend(files);
+    }
+
+    /// Vouches for no other files than those that count: of what a damaged `SHA256SUMS` names, nothing stays.
+    pub(crate) fn forget_unless(&mut self, counts: impl Fn(&str) -> bool) {
+        self.digests.retain(|file, _| counts(file));
     }
 
     /// Whether the folder already vouches for just these bytes.
@@ -131,7 +170,13 @@ impl RunFolder {
     pub(crate) fn read(&self, relative: &str) -> Result<Vec<u8>, Error> {
         let path = self.path.join(relative);
         let bytes = fs::read(&path).map_err(|source| Error::Read { path: path.clone(), source })?;
+        self.reads.lock().unwrap_or_else(PoisonError::into_inner).insert(relative.to_owned());
         self.check(relative, &bytes).map(|()| bytes)
+    }
+
+    /// The result files that have been read since the last call.
+    pub(crate) fn take_reads(&self) -> BTreeSet<String> {
+        std::mem::take(&mut self.reads.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// One digest over the lines of `SHA256SUMS` for the files that count.

@@ -153,7 +153,11 @@ fn results(
     let compared =
         espalier_juxtapose::juxtapose(&runs[0].tree, &runs[1].tree, &request.params).map_err(failed)?;
     for warning in compared.report.warnings {
-        events(Event::Warning { stage: Stage::Tree, code: warning.code, message: warning.message });
+        events(Event::Warning {
+            stage: Stage::Tree,
+            code: warning.code.to_owned(),
+            message: warning.message,
+        });
     }
     let mut found = compared.juxtaposition;
     // As every stage: what goes on is what was written.

@@ -11,6 +11,7 @@
 //! | two runs on one shared map | [`juxtapose`](mod@juxtapose) |
 //! | a config at many settings | [`sweep`](mod@sweep) |
 //! | the run folder: atomic files, digests, one lock | `folder` |
+//! | what a stage's results were made from, and whether they still stand | `record` |
 //! | how a result came about, what each method cost | `provenance`, `methods` |
 //! | the page of a run: what it is made from | `page` |
 //! | what the columns of the tables mean | `dictionary` |
@@ -38,6 +39,7 @@ mod page;
 mod phantom;
 mod profile;
 mod provenance;
+mod record;
 pub mod run;
 mod settings;
 mod side_file;
@@ -60,7 +62,8 @@ pub use locate::{Given, Located, Space, locate, read_point, read_points};
 pub use phantom::make_phantom;
 pub use profile::{PlotRequest, Plotted, WayTo, plot_profile, profile};
 pub use provenance::{input_of_run, side_file_of_run};
-pub use run::{Request, Summary, run};
+pub use record::Reason;
+pub use run::{Plan, Request, Summary, plan, run};
 pub use settings::Difference;
 pub use side_file::SideFile;
 pub use stage::{Artifact, Stage};

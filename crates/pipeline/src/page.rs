@@ -108,7 +108,8 @@ pub(crate) fn slices(
 
 /// Whether a file counts as a result: what the page says is one digest of them all.
 fn is_result(file: &str) -> bool {
-    !file.starts_with("provenance/") && !Stage::Report.writes().iter().any(|own| own == file)
+    let is_of_making = file.starts_with("provenance/") || file.ends_with("/record.json");
+    !is_of_making && !Stage::Report.writes().iter().any(|own| own == file)
 }
 
 /// Whether tree and embedding are those of the folder.

@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 
 use espalier_model::Report;
 use espalier_model::table::{Column, Table};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::clock;
 use crate::config::{Config, UNNAMED};
 use crate::error::Error;
 use crate::folder::{RunFolder, file_digest};
+use crate::record::Record;
+use crate::settings;
 use crate::side_file::SideFile;
 use crate::stage::Stage;
 
@@ -50,6 +52,8 @@ pub(crate) const TIMING_COLUMNS: [Column; 4] = [
 ];
 
 pub(crate) const INPUTS_FILE: &str = "provenance/inputs.tsv";
+/// What of `provenance/` is the same for equal runs, and no stage's own.
+pub(crate) const FILES: [&str; 2] = [INPUTS_FILE, settings::FILE];
 const RUN_FILE: &str = "provenance/run.json";
 const TIMINGS_FILE: &str = "provenance/timings.tsv";
 /// The role of the input in `provenance/inputs.tsv`.
@@ -77,14 +81,15 @@ fn absolute(path: &Path) -> Option<String> {
     std::path::absolute(path).ok().map(|path| path.to_string_lossy().into_owned())
 }
 
-/// Writes `provenance/inputs.tsv`: the content of the input's files, without their names, which may be a patient's.
-/// A DICOM series has a row for each slice, by position.
-pub(crate) fn write_inputs(folder: &mut RunFolder, input: &[PathBuf]) -> Result<(), Error> {
-    let table = Table::with(&INPUT_COLUMNS).into_string() + &input_rows(input)?;
+/// Writes `provenance/inputs.tsv` with the rows of the input.
+pub(crate) fn write_inputs(folder: &mut RunFolder, rows: &str) -> Result<(), Error> {
+    let table = Table::with(&INPUT_COLUMNS).into_string() + rows;
     folder.write(INPUTS_FILE, table.as_bytes())
 }
 
-fn input_rows(input: &[PathBuf]) -> Result<String, Error> {
+/// The content of the input's files, without their names, which may be a patient's. A DICOM series has a row for each
+/// slice, by position.
+pub(crate) fn input_rows(input: &[PathBuf]) -> Result<String, Error> {
     input.iter().map(|path| row(INPUT, path)).collect()
 }
 
@@ -128,6 +133,12 @@ fn rows(folder: &RunFolder) -> Result<Option<String>, Error> {
 
 fn is_of(role: &str, row: &str) -> bool {
     row.split('\t').next() == Some(role)
+}
+
+/// The SHA-256 of a file that the user names.
+pub(crate) fn digest(path: &Path) -> Result<String, Error> {
+    let digest = file_digest(path).map_err(|source| Error::Read { path: path.to_owned(), source });
+    digest.map(|(_, digest)| digest)
 }
 
 /// The row of a file.
@@ -185,8 +196,10 @@ pub(crate) fn write_run(
     folder.write_aside(RUN_FILE, json.as_bytes())?;
     // The peak is of the whole program until the end of the stage: the system keeps no other.
     let mut table = Table::with(&TIMING_COLUMNS);
-    let first = costs.first().map(|cost| cost.stage);
-    for cells in timings(folder).iter().filter(|cells| Stage::from_name(&cells[0]) < first) {
+    let is_kept = |stage: Stage| {
+        costs.iter().all(|cost| cost.stage != stage) && folder.digest(&Record::file_of(stage)).is_some()
+    };
+    for cells in timings(folder).iter().filter(|cells| Stage::from_name(&cells[0]).is_some_and(is_kept)) {
         table.row_of(cells);
     }
     for cost in costs {
@@ -236,6 +249,23 @@ struct ReportRecord<'a> {
 struct WarningRecord<'a> {
     code: &'static str,
     message: &'a str,
+}
+
+/// The warnings that a stage gave when its results were made: codes and messages.
+pub(crate) fn warnings(folder: &RunFolder, stage: Stage) -> Result<Vec<(String, String)>, Error> {
+    #[derive(Deserialize)]
+    struct Said {
+        warnings: Vec<Warned>,
+    }
+    #[derive(Deserialize)]
+    struct Warned {
+        code: String,
+        message: String,
+    }
+    let text = folder.text_if_there(&format!("{}/report.json", stage.folder()))?;
+    let said = text.and_then(|text| serde_json::from_str::<Said>(&text).ok());
+    let warned = said.into_iter().flat_map(|said| said.warnings);
+    Ok(warned.map(|warned| (warned.code, warned.message)).collect())
 }
 
 /// The text of a stage's `report.json`.

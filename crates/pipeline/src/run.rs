@@ -1,6 +1,6 @@
 //! The loop over the stages.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use espalier_model::Diagnose;
@@ -10,8 +10,9 @@ use crate::clock::Stopwatch;
 use crate::config::{Config, Loaded, Source, Unit};
 use crate::error::Error;
 use crate::event::Event;
-use crate::folder::RunFolder;
+use crate::folder::{RunFolder, hex_digest};
 use crate::provenance::{self, StageCost};
+use crate::record::{MadeFrom, Reason, Record};
 use crate::settings::Settings;
 use crate::side_file::SideFile;
 use crate::stage::{Artifact, Stage};
@@ -30,6 +31,8 @@ pub struct Request {
     pub to: Option<Stage>,
     /// Files to use instead of those in the run folder.
     pub files: BTreeMap<Artifact, PathBuf>,
+    /// Whether stages are done also where their results stand.
+    pub force: bool,
     /// Threads; `None` for one per core. No result depends on it.
     pub threads: Option<usize>,
     /// The most memory that reading a file may take, in bytes.
@@ -72,20 +75,10 @@ pub(crate) fn in_pool<T: Send>(
 }
 
 fn run_stages(request: &Request, events: &(dyn Fn(Event) + Sync)) -> Result<Summary, Error> {
-    let source = resolve_source(request)?;
-    let stages = stages_to_do(request, &source)?;
-    let artifacts = artifacts_of(request, &source);
-    let input = input_file(&stages, &artifacts);
-    // A missing input must not leave a folder behind.
-    let sides = artifacts.side_paths.iter().filter(|(side, _)| stages.contains(&side.stage()));
-    for path in input.iter().chain(sides.map(|(_, path)| path)) {
-        let may_be_folder = matches!(source, Source::Volume(_)) && Some(path) == input.as_ref();
-        steps::check_readable(path, may_be_folder)?;
-    }
-
+    let (mut run, stages) = prepare(request, events)?;
     let mut folder = RunFolder::open(&request.out)?;
-    let mut run = Run { request, source, artifacts, events, costs: Vec::new() };
-    let done = run.perform(&mut folder, &stages, input.as_deref());
+    folder.forget_unless(is_known);
+    let done = run.perform(&mut folder, &stages);
     if done.is_err() {
         folder.remove_if_unused();
         let kept = run.costs.iter().map(|cost| cost.stage).collect();
@@ -93,8 +86,70 @@ fn run_stages(request: &Request, events: &(dyn Fn(Event) + Sync)) -> Result<Summ
     }
     let digest = done?;
     let highlights = stages.last().map(|last| last.writes()).unwrap_or_default();
-    let highlights = highlights.into_iter().filter(|file| folder.path().join(file).exists()).collect();
+    let is_highlight = |file: &String| !file.ends_with("/record.json") && folder.path().join(file).exists();
+    let highlights = highlights.into_iter().filter(is_highlight).collect();
     Ok(Summary { out: request.out.clone(), highlights, digest })
+}
+
+/// A run that has all it needs, and its stages. Nothing is made yet: a missing input must not leave a folder behind.
+fn prepare<'a>(
+    request: &'a Request,
+    events: &'a (dyn Fn(Event) + Sync),
+) -> Result<(Run<'a>, Vec<Stage>), Error> {
+    let source = resolve_source(request)?;
+    let stages = stages_to_do(request, &source)?;
+    let artifacts = artifacts_of(request, &source);
+    let input = input_file(&stages, &artifacts);
+    let sides = artifacts.side_paths.iter().filter(|(side, _)| stages.contains(&side.stage()));
+    for path in input.iter().chain(sides.map(|(_, path)| path)) {
+        let may_be_folder = matches!(source, Source::Volume(_)) && Some(path) == input.as_ref();
+        steps::check_readable(path, may_be_folder)?;
+    }
+    let run = Run {
+        request,
+        source,
+        artifacts,
+        events,
+        input,
+        input_rows: None,
+        foreign: Vec::new(),
+        costs: Vec::new(),
+    };
+    Ok((run, stages))
+}
+
+/// What a run would do with a stage.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Plan {
+    /// The stage.
+    pub stage: Stage,
+    /// Why it would be done; none if its results stand.
+    pub reason: Option<Reason>,
+}
+
+/// What a run would do, stage by stage; nothing is written and nothing is locked.
+///
+/// # Errors
+/// [`Error`], as the run itself would before its first stage.
+pub fn plan(request: &Request) -> Result<Vec<Plan>, Error> {
+    let (mut run, stages) = prepare(request, &|_| {})?;
+    let folder = RunFolder::to_read(&request.out);
+    let settings = Settings::open(&folder, &request.loaded.config);
+    run.refuse_other_settings(&folder, &settings, &stages)?;
+    run.take_stock_of_input(&stages)?;
+    let mut planned: Vec<Plan> = Vec::new();
+    for stage in stages {
+        let before = planned.iter().rev().find(|plan| plan.reason.is_some() && stage.follows(plan.stage));
+        let reason = match before.map(|plan| plan.stage) {
+            Some(earlier) if !request.force => Some(Reason::After { stage: earlier }),
+            _ => {
+                let made_from = run.made_from(&folder, &settings, stage)?;
+                run.standing(&folder, stage, &made_from)?.err()
+            }
+        };
+        planned.push(Plan { stage, reason });
+    }
+    Ok(planned)
 }
 
 /// A run under way.
@@ -103,54 +158,148 @@ struct Run<'a> {
     source: Source,
     artifacts: Artifacts,
     events: &'a (dyn Fn(Event) + Sync),
+    /// The file that the first stage begins with, if it is the user's.
+    input: Option<PathBuf>,
+    /// The rows of `provenance/inputs.tsv` for it, if it is.
+    input_rows: Option<String>,
+    /// Stages whose files in the folder are of another run.
+    foreign: Vec<Stage>,
     costs: Vec<StageCost>,
 }
 
 impl Run<'_> {
-    /// Does the stages one after the other; gives the digest of the sealed folder.
-    fn perform(
+    /// Does the stages one after the other, but for those whose results stand; gives the digest of the sealed folder.
+    fn perform(&mut self, folder: &mut RunFolder, stages: &[Stage]) -> Result<String, Error> {
+        let mut settings = Settings::open(folder, &self.request.loaded.config);
+        self.refuse_other_settings(folder, &settings, stages)?;
+        self.take_stock_of_input(stages)?;
+        self.foreign = self.foreign(&settings);
+        for &stage in stages {
+            let made_from = self.made_from(folder, &settings, stage)?;
+            match self.standing(folder, stage, &made_from)? {
+                Ok(record) => self.keep(folder, &mut settings, stage, record)?,
+                Err(_) => self.make(folder, &mut settings, stage, made_from)?,
+            }
+        }
+        stages.last().map_or(Ok(()), |&last| self.clear_away(folder, last))?;
+        folder.seal()
+    }
+
+    /// Digests of the input's files.
+    fn take_stock_of_input(&mut self, stages: &[Stage]) -> Result<(), Error> {
+        let (Some(input), Some(&first)) = (&self.input, stages.first()) else { return Ok(()) };
+        let files = input_files(&self.source, &self.artifacts, (first, input))?;
+        self.input_rows = Some(provenance::input_rows(&files)?);
+        Ok(())
+    }
+
+    /// The record of a stage's results, if they are to be kept; else why not.
+    fn standing(
+        &self,
+        folder: &RunFolder,
+        stage: Stage,
+        made_from: &MadeFrom,
+    ) -> Result<Result<Record, Reason>, Error> {
+        if self.request.force { Ok(Err(Reason::Forced)) } else { Record::standing(folder, stage, made_from) }
+    }
+
+    /// Keeps a stage's results, and repeats what was said of them.
+    fn keep(
+        &self,
+        folder: &mut RunFolder,
+        settings: &mut Settings,
+        stage: Stage,
+        record: Record,
+    ) -> Result<(), Error> {
+        let record_file = Record::file_of(stage);
+        let own = folder.digest_if_there(&record_file)?.map(|digest| (record_file, digest));
+        folder.adopt(record.files().clone().into_iter().chain(own));
+        self.write_provenance(folder, settings, stage)?;
+        for (code, message) in provenance::warnings(folder, stage)? {
+            (self.events)(Event::Warning { stage, code, message });
+        }
+        (self.events)(Event::Kept { stage, line: record.line });
+        Ok(())
+    }
+
+    /// Does a stage and writes what it made.
+    fn make(
         &mut self,
         folder: &mut RunFolder,
-        stages: &[Stage],
-        input: Option<&Path>,
-    ) -> Result<String, Error> {
+        settings: &mut Settings,
+        stage: Stage,
+        made_from: MadeFrom,
+    ) -> Result<(), Error> {
         let (config, events) = (&self.request.loaded.config, self.events);
-        let mut settings = Settings::open(folder, config);
-        self.refuse_other_settings(folder, &settings, stages)?;
-        for &stage in stages {
-            events(Event::Started { stage });
-            let watch = Stopwatch::start();
-            let (source, artifacts) = (&self.source, &mut self.artifacts);
-            let mut step = Step { stage, config, source, artifacts, events, folder, parts: Vec::new() };
-            let outcome = steps::perform(&mut step)?;
-            let parts = step.parts;
-
-            if Some(&stage) == stages.first() {
-                self.clear_away(folder, &settings)?;
-                if Some(stage) == stages_of(&self.source).first().copied() {
-                    let files = input.map(|input| self.input_files(stage, input)).transpose()?;
-                    provenance::write_inputs(folder, &files.unwrap_or_default())?;
-                }
-            }
-            for side in SideFile::ALL.into_iter().filter(|side| side.stage() == stage) {
-                provenance::write_side_file(folder, side, self.artifacts.side_paths.get(&side))?;
-            }
-            write_outcome(folder, stage, &outcome)?;
-            settings.adopt(folder, stage)?;
-            let digest = folder.seal()?;
-            let peak_mb = provenance::peak_memory_mb();
-            let cost = StageCost { stage, seconds: watch.seconds(), peak_mb, parts };
-            let seconds = cost.seconds;
-            self.costs.push(cost);
-            let files = (input, &self.artifacts.side_paths);
-            provenance::write_run(folder, config, files, &self.costs, &digest)?;
-
-            for warning in outcome.report.warnings {
-                events(Event::Warning { stage, code: warning.code, message: warning.message });
-            }
-            events(Event::Finished { stage, seconds, line: outcome.line });
+        events(Event::Started { stage });
+        let watch = Stopwatch::start();
+        let (source, artifacts) = (&self.source, &mut self.artifacts);
+        let mut step = Step { stage, config, source, artifacts, events, folder, parts: Vec::new() };
+        folder.take_reads();
+        let outcome = steps::perform(&mut step)?;
+        let parts = step.parts;
+        debug_assert_eq!(undeclared(stage, folder.take_reads()), [""; 0], "read by {stage}");
+        self.clear_away(folder, stage)?;
+        write_outcome(folder, (stage, made_from), &outcome)?;
+        self.write_provenance(folder, settings, stage)?;
+        let digest = folder.seal()?;
+        let seconds = watch.seconds();
+        self.costs.push(StageCost { stage, seconds, peak_mb: provenance::peak_memory_mb(), parts });
+        let files = (self.input.as_deref(), &self.artifacts.side_paths);
+        provenance::write_run(folder, config, files, &self.costs, &digest)?;
+        for warning in outcome.report.warnings {
+            let code = warning.code.to_owned();
+            events(Event::Warning { stage, code, message: warning.message });
         }
-        folder.seal()
+        events(Event::Finished { stage, seconds, line: outcome.line });
+        Ok(())
+    }
+
+    /// Inputs and settings as far as they are a stage's.
+    fn write_provenance(
+        &self,
+        folder: &mut RunFolder,
+        settings: &mut Settings,
+        stage: Stage,
+    ) -> Result<(), Error> {
+        if Some(stage) == stages_of(&self.source).first().copied() {
+            provenance::write_inputs(folder, self.input_rows.as_deref().unwrap_or_default())?;
+        }
+        for side in SideFile::ALL.into_iter().filter(|side| side.stage() == stage) {
+            provenance::write_side_file(folder, side, self.artifacts.side_paths.get(&side))?;
+        }
+        settings.adopt(folder, stage)
+    }
+
+    /// All that a stage's results depend on, as it is now.
+    fn made_from(&self, folder: &RunFolder, settings: &Settings, stage: Stage) -> Result<MadeFrom, Error> {
+        let mut facts = settings.of(stage);
+        let version = format!("{} of espalier {}", stage.version(), env!("CARGO_PKG_VERSION"));
+        facts.insert("version".to_owned(), version);
+        let is_traced = stage == Stage::Tree && self.artifacts.is_traced(&self.source);
+        let artifacts = if is_traced { &[Artifact::Traced] } else { stage.reads() };
+        for artifact in artifacts {
+            let digest = match self.artifacts.files.get(artifact) {
+                Some(path) => Some(self.digest_of_input(*artifact, path)?),
+                None => folder.digest(artifact.file()).cloned(),
+            };
+            facts.extend(digest.map(|digest| (artifact.what().to_owned(), digest)));
+        }
+        for file in stage.reads_beside() {
+            facts.extend(folder.digest(&file).cloned().map(|digest| (file, digest)));
+        }
+        for (side, path) in self.artifacts.side_paths.iter().filter(|(side, _)| side.stage() == stage) {
+            facts.insert(side.key().to_owned(), provenance::digest(path)?);
+        }
+        Ok(MadeFrom(facts))
+    }
+
+    /// The digest of a file that the user names; of a series, one over all of its files.
+    fn digest_of_input(&self, artifact: Artifact, path: &Path) -> Result<String, Error> {
+        match (&self.input_rows, artifact) {
+            (Some(rows), Artifact::Volume | Artifact::Traced) => Ok(hex_digest(rows.as_bytes())),
+            _ => provenance::digest(path),
+        }
     }
 
     /// A run that begins in the middle builds on results that were made with the same settings, or not at all.
@@ -180,53 +329,100 @@ impl Run<'_> {
         // Scans of many patients share one name; their content tells them apart. A scan that lies elsewhere now, or
         // nowhere, is no reason to stop: nothing will be read from it.
         let (Source::Volume(input) | Source::Tree(input)) = &self.source else { return Ok(()) };
-        if input.exists() && provenance::is_other_input(folder, &self.input_files(available[0], input)?)? {
+        if input.exists() && self.is_other_input(folder, available[0], input)? {
             return Err(Error::OtherInput { from, path: input.clone(), first: available[0] });
         }
         Ok(())
     }
 
-    /// The files that an input is read from: several where it is a DICOM series.
-    fn input_files(&self, stage: Stage, input: &Path) -> Result<Vec<PathBuf>, Error> {
-        match self.source {
-            Source::Volume(_) => espalier_volume::files(input, &self.artifacts.read_options)
-                .map_err(|error| Error::stage(stage)(boxed(error))),
-            _ => Ok(vec![input.to_owned()]),
+    fn is_other_input(&self, folder: &RunFolder, first: Stage, input: &Path) -> Result<bool, Error> {
+        let files = input_files(&self.source, &self.artifacts, (first, input))?;
+        provenance::is_other_input(folder, &files)
+    }
+
+    /// The stages whose files in the folder are not of this run: all, if input or seed are others; else those that a run
+    /// from this input does not have.
+    fn foreign(&self, settings: &Settings) -> Vec<Stage> {
+        let available = stages_of(&self.source);
+        let is_foreign = |stage: &Stage| settings.is_other_run() || !available.contains(stage);
+        if self.request.files.is_empty() {
+            Stage::ALL.into_iter().filter(is_foreign).collect()
+        } else {
+            Vec::new()
         }
     }
 
-    /// Removes what is not of this run: everything, if input or seed are others; else the files of stages that a run
-    /// from this input does not have.
-    fn clear_away(&self, folder: &mut RunFolder, settings: &Settings) -> Result<(), Error> {
-        if !self.request.files.is_empty() {
-            return Ok(());
-        }
+    /// Removes the files of another run, but for those of this stage and the ones before, which are in place.
+    fn clear_away(&mut self, folder: &mut RunFolder, done: Stage) -> Result<(), Error> {
         let available = stages_of(&self.source);
-        let is_foreign = |stage: &Stage| settings.is_other_run() || !available.contains(stage);
-        let files: Vec<String> =
-            Stage::ALL.iter().filter(|stage| is_foreign(stage)).flat_map(|s| s.writes()).collect();
-        folder.discard(&files)
+        let foreign = std::mem::take(&mut self.foreign).into_iter();
+        let outdated = foreign.filter(|stage| *stage > done || !available.contains(stage));
+        folder.discard(&outdated.flat_map(Stage::writes).collect::<Vec<_>>())
     }
 }
 
-/// Writes a stage's files. If any of them is not what the folder had, the files of later stages go first: what they
-/// were made from is no more.
-fn write_outcome(folder: &mut RunFolder, stage: Stage, outcome: &steps::Outcome) -> Result<(), Error> {
+/// The files that an input is read from: several where it is a DICOM series, or a header with its data.
+fn input_files(
+    source: &Source,
+    artifacts: &Artifacts,
+    (stage, input): (Stage, &Path),
+) -> Result<Vec<PathBuf>, Error> {
+    match source {
+        Source::Volume(_) => espalier_volume::files(input, &artifacts.read_options)
+            .map_err(|error| Error::stage(stage)(boxed(error))),
+        _ => Ok(vec![input.to_owned()]),
+    }
+}
+
+/// Writes a stage's files, its record last. What was made from another version of them goes first.
+fn write_outcome(
+    folder: &mut RunFolder,
+    (stage, made_from): (Stage, MadeFrom),
+    outcome: &steps::Outcome,
+) -> Result<(), Error> {
     let report_json = provenance::report_json(stage, &outcome.report);
     let report = (format!("{}/report.json", stage.folder()), report_json.into_bytes());
     let files: Vec<&(String, Vec<u8>)> = outcome.files.iter().chain([&report]).collect();
-    let is_same = files.iter().all(|(file, bytes)| folder.vouches_for(file, bytes));
-    let outdated: Vec<String> = Stage::ALL
-        .into_iter()
-        .filter(|other| *other == stage || (*other > stage && !is_same))
-        .flat_map(Stage::writes)
-        .filter(|file| !is_same || !files.iter().any(|(written, _)| written == file))
-        .collect();
-    folder.discard(&outdated)?;
-    for (file, bytes) in files {
+    let is_written = |file: &String| files.iter().any(|(written, _)| written == file);
+    let gone = stage.writes().into_iter().filter(|file| !is_written(file) && folder.digest(file).is_some());
+    let new = files.iter().filter(|(file, bytes)| !folder.vouches_for(file, bytes));
+    let changed: BTreeSet<String> = gone.chain(new.map(|(file, _)| file.clone())).collect();
+    folder.discard(&outdated(stage, changed))?;
+    for (file, bytes) in &files {
         folder.write(file, bytes)?;
     }
-    Ok(())
+    let digest = |(file, _): &&(String, Vec<u8>)| Some((file.clone(), folder.digest(file)?.clone()));
+    let digests = files.iter().filter_map(digest).collect();
+    let record = Record::new(stage, made_from, digests, outcome.line.clone());
+    folder.write(&Record::file_of(stage), record.to_json().as_bytes())
+}
+
+/// The files that do not hold any more once some files of a stage change: those of the stage itself, and those of later
+/// stages that read one of them.
+fn outdated(stage: Stage, mut changed: BTreeSet<String>) -> Vec<String> {
+    let earlier: BTreeSet<String> =
+        Stage::ALL.into_iter().filter(|s| *s < stage).flat_map(Stage::writes).collect();
+    let kept: BTreeSet<String> = stage.writes().into_iter().filter(|file| !changed.contains(file)).collect();
+    for later in Stage::ALL.into_iter().filter(|later| *later > stage) {
+        let reads =
+            later.reads().iter().map(|artifact| artifact.file().to_owned()).chain(later.reads_beside());
+        if reads.into_iter().any(|file| changed.contains(&file)) {
+            changed.extend(later.writes());
+        }
+    }
+    changed.into_iter().filter(|file| !earlier.contains(file) && !kept.contains(file)).collect()
+}
+
+/// The files that a stage has read without being known to: its results would be kept when one of them changes.
+fn undeclared(stage: Stage, reads: BTreeSet<String>) -> Vec<String> {
+    let known: Vec<String> = stage.files_read().collect();
+    reads.into_iter().filter(|file| !known.contains(file)).collect()
+}
+
+/// Whether a file of a run folder is one that `SHA256SUMS` may name.
+fn is_known(file: &str) -> bool {
+    provenance::FILES.contains(&file)
+        || Stage::ALL.into_iter().any(|stage| stage.writes().iter().any(|own| own == file))
 }
 
 fn resolve_source(request: &Request) -> Result<Source, Error> {

@@ -64,6 +64,14 @@ impl Settings {
         })
     }
 
+    /// The settings that a stage's results depend on, by dotted key.
+    pub(crate) fn of(&self, stage: Stage) -> BTreeMap<String, String> {
+        let mut all = BTreeMap::new();
+        flatten("", &self.wanted, &mut all);
+        all.retain(|key, _| concerns(stage, key));
+        all
+    }
+
     /// Takes over the settings of a stage whose results have just been made, and writes the file.
     pub(crate) fn adopt(&mut self, folder: &mut RunFolder, stage: Stage) -> Result<(), Error> {
         let wanted = &self.wanted;
@@ -77,6 +85,23 @@ impl Settings {
         // Plain tables: serialisation cannot fail. They are sorted by key, however they were put together.
         folder.write(FILE, toml::to_string(kept).unwrap_or_default().as_bytes())
     }
+}
+
+/// Whether a stage's results depend on a setting.
+fn concerns(stage: Stage, key: &str) -> bool {
+    let table = key.split('.').next().unwrap_or_default();
+    let is_shared = match stage {
+        // The page lists them all.
+        Stage::Report => true,
+        Stage::Phantom => matches!(table, "input" | "seed"),
+        // How masks and traced trees are read.
+        Stage::Volume | Stage::Skeleton | Stage::Radius | Stage::Tree => {
+            table == "input" || key == "volume.orientation"
+        }
+        Stage::Views | Stage::Embed => table == "seed",
+        Stage::Render => table == "name",
+    };
+    is_shared || table == "schema" || table == stage.name()
 }
 
 /// Every setting of a run as a dotted key with its value, and the value that it has when nobody says; of files only that

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::provenance::INPUTS_FILE;
+
 /// A stage of the pipeline. The order is the order of the data flow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Stage {
@@ -24,6 +26,9 @@ pub enum Stage {
     /// Everything before → the page of the run.
     Report,
 }
+
+/// Where the `volume` stage leaves its part of the topology ledger.
+pub(crate) const DROPPED_FILE: &str = "stages/01-volume/dropped.tsv";
 
 /// A piece of hand-over data that has a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -106,6 +111,38 @@ impl Stage {
         }
     }
 
+    /// The version of what it makes: another one makes other results from the same input and settings.
+    pub(crate) fn version(self) -> u32 {
+        1
+    }
+
+    /// The files of earlier stages that it reads beside its artifacts, relative to the run folder. The page reads every
+    /// file of every earlier stage.
+    pub(crate) fn reads_beside(self) -> Vec<String> {
+        match self {
+            Self::Tree => [DROPPED_FILE, Artifact::Traced.file()].map(str::to_owned).into(),
+            Self::Render => vec![Artifact::Comparison.file().to_owned()],
+            Self::Report => {
+                let earlier = Self::ALL.into_iter().filter(|other| *other < self).flat_map(Self::writes);
+                earlier.chain([INPUTS_FILE.to_owned()]).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// All files of earlier stages that it reads, relative to the run folder.
+    pub(crate) fn files_read(self) -> impl Iterator<Item = String> {
+        self.reads().iter().map(|artifact| artifact.file().to_owned()).chain(self.reads_beside())
+    }
+
+    /// Whether it reads a file that another stage writes.
+    pub(crate) fn follows(self, other: Self) -> bool {
+        let written = other.writes();
+        let mut reads =
+            self.reads().iter().map(|artifact| artifact.file().to_owned()).chain(self.reads_beside());
+        other < self && reads.any(|file| written.contains(&file))
+    }
+
     /// Every file it may write, relative to the run folder.
     #[must_use]
     pub fn writes(self) -> Vec<String> {
@@ -164,7 +201,8 @@ impl Stage {
             .iter()
             .map(|file| file.strip_prefix('/').map_or_else(|| format!("{folder}/{file}"), str::to_owned))
             .collect();
-        paths.push(format!("{folder}/report.json"));
+        // The record last: it says that the others are there.
+        paths.extend(["report.json", "record.json"].map(|file| format!("{folder}/{file}")));
         paths
     }
 }

@@ -321,11 +321,8 @@ impl<'a> Step<'a> {
         Error::stage(self.stage)(boxed(error))
     }
 
-    /// Whether the tree comes from a traced one. A mask named by the user goes before the config's source.
     pub(crate) fn is_traced(&self) -> bool {
-        let named = |artifact| self.artifacts.files.contains_key(&artifact);
-        named(Artifact::Traced)
-            || (matches!(self.source, Source::PhantomTree(_) | Source::Tree(_)) && !named(Artifact::Mask))
+        self.artifacts.is_traced(self.source)
     }
 
     /// An artifact's bytes at its place in the run folder.

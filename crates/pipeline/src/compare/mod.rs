@@ -75,6 +75,7 @@ impl Subject {
             from: None,
             to: Some(to),
             files: std::collections::BTreeMap::new(),
+            force: false,
             threads,
             max_memory_bytes,
             data_dir,

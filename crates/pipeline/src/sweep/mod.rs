@@ -248,6 +248,7 @@ fn request_of(
         from,
         to: Some(to),
         files: BTreeMap::new(),
+        force: false,
         threads: request.threads,
         max_memory_bytes: request.max_memory_bytes,
         data_dir: request.data_dir.clone(),
