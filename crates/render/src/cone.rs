@@ -48,6 +48,27 @@ pub(crate) struct Cone {
     range: [f32; 2],
     /// What light sees at either end.
     lit: [LitEnd; 2],
+    /// The box that holds the cone: low and high corner.
+    bounds: (Vec2, Vec2),
+    outline: Outline,
+}
+
+/// The hull of two discs.
+#[derive(Clone, Copy, Debug)]
+struct Outline {
+    /// How long the axis is seen.
+    seen: f32,
+    /// Sine and cosine of the angle between the outline's straight sides and the axis; `None` where one disc holds the
+    /// other.
+    side: Option<[f32; 2]>,
+}
+
+impl Outline {
+    fn new(seen: f32, radii: [f32; 2]) -> Self {
+        let taper = radii[1] - radii[0];
+        let sin = taper / seen;
+        Self { seen, side: (taper.abs() < seen).then(|| [sin, (1.0 - sin * sin).sqrt()]) }
+    }
 }
 
 /// The direction of the surface at an end of a cone, as light sees it.
@@ -122,10 +143,13 @@ impl Cone {
             (-slack(start.radius, &before)).min(length * seen - lean(end.radius)),
             (length * seen + slack(end.radius, &after)).max(lean(start.radius)),
         ];
+        let radii = [start.radius as f32, end.radius as f32];
+        let [from, to] = [start.center.as_vec3(), end.center.as_vec3()];
+        let [a, b] = [from.truncate(), to.truncate()];
         Self {
-            start: start.center.as_vec3(),
-            end: end.center.as_vec3(),
-            radii: [start.radius as f32, end.radius as f32],
+            start: from,
+            end: to,
+            radii,
             along: along.as_vec2(),
             m: seen as f32,
             uz: unit.z as f32,
@@ -137,6 +161,8 @@ impl Cone {
                 taper: bend.taper as f32,
                 is_end: bend.is_end,
             }),
+            bounds: ((a - radii[0]).min(b - radii[1]), (a + radii[0]).max(b + radii[1])),
+            outline: Outline::new(length as f32 * seen as f32, radii),
         }
     }
 
@@ -181,8 +207,7 @@ impl Cone {
 
     /// The box that holds the cone: low and high corner.
     pub(crate) fn bounds(&self) -> (Vec2, Vec2) {
-        let (a, b) = (self.start.truncate(), self.end.truncate());
-        ((a - self.radii[0]).min(b - self.radii[1]), (a + self.radii[0]).max(b + self.radii[1]))
+        self.bounds
     }
 
     /// About how many pixels the cone must look at when it is `margin` wider: its box, or its strip of the chain.
@@ -253,13 +278,8 @@ impl Cone {
     fn outside(&self, pixel: Vec2, w: Vec2, x: f32) -> f32 {
         let from_start = || w.length() - self.radii[0];
         let from_end = || (pixel - self.end.truncate()).length() - self.radii[1];
-        let seen = self.length * self.m;
-        let taper = self.radii[1] - self.radii[0];
-        if taper.abs() >= seen {
-            return from_start().min(from_end());
-        }
-        let sin = taper / seen;
-        let cos = (1.0 - sin * sin).sqrt();
+        let Outline { seen, side } = self.outline;
+        let Some([sin, cos]) = side else { return from_start().min(from_end()) };
         let y = w.perp_dot(self.along).abs();
         let tangent = x * cos + y * sin;
         if tangent < 0.0 {

@@ -209,7 +209,9 @@ impl<'a> Raster<'a> {
         brush.tile.draw(job, list, lattice, !self.is_plain);
         let is_refined = n == 1 && !self.is_plain && !is_crowded;
         for (row, line) in pixels.chunks_mut(width).enumerate() {
-            for (x, pixel) in line.iter_mut().skip(column * TILE).take(TILE).enumerate() {
+            let used = brush.tile.used_pixels(row + rim);
+            let line = line.iter_mut().skip(column * TILE).take(TILE).enumerate();
+            for (x, pixel) in line.take(used.end.saturating_sub(rim)).skip(used.start.saturating_sub(rim)) {
                 let at = [x + rim, row + rim];
                 if is_refined && self.has_edge(&brush.tile, at) {
                     let origin = corner + Vec2::new(x as f32, row as f32);

@@ -206,6 +206,23 @@ impl Lattice {
         from + (index as f32 + 0.5) * (1.0 / self.n as f32)
     }
 
+    /// A sample of a row whose place on the other axis is `y`.
+    fn pixel(self, row: usize, sample: usize, y: f32) -> Vec2 {
+        Vec2::new(self.place(self.origin.x, sample - row * self.row()), y)
+    }
+
+    /// Row by row, what a cone can reach when it is `margin` wider: the row, its place, its samples.
+    fn runs(self, cone: &Cone, margin: f32) -> impl Iterator<Item = (usize, f32, Range<usize>)> + '_ {
+        let (low, high) = cone.bounds();
+        self.clip(low.y - margin, high.y + margin, self.origin.y).filter_map(move |row| {
+            let y = self.place(self.origin.y, row);
+            let (from, to) = cone.span(y, margin)?;
+            let columns = self.clip(from, to, self.origin.x);
+            let first = row * self.row();
+            Some((row, y, first + columns.start..first + columns.end)).filter(|(.., run)| !run.is_empty())
+        })
+    }
+
     /// The distance from an outline at which a sample begins to be covered: half of it.
     fn fringe_px(self) -> f32 {
         0.5 / self.n as f32
@@ -225,8 +242,10 @@ pub(crate) struct Samples {
     pub lattice: Lattice,
     /// What is highest.
     pub best: Vec<Best>,
-    /// What is seen.
+    /// What is seen, wherever [`Self::best`] is something.
     pub surface: Vec<Surface>,
+    /// By row: the samples outside of which nothing is.
+    used: Vec<Range<usize>>,
     /// The highest cone of the branch in hand, by sample, and the samples that it comes near to.
     branch: Vec<Best>,
     touched: Vec<usize>,
@@ -236,37 +255,70 @@ impl Samples {
     /// Samples that see nothing.
     pub(crate) fn new() -> Self {
         let lattice = Lattice { origin: Vec2::ZERO, n_pixels: 0, n: 1 };
-        Self { lattice, best: Vec::new(), surface: Vec::new(), branch: Vec::new(), touched: Vec::new() }
+        Self {
+            lattice,
+            best: Vec::new(),
+            surface: Vec::new(),
+            used: Vec::new(),
+            branch: Vec::new(),
+            touched: Vec::new(),
+        }
+    }
+
+    /// The pixels of a row outside of which nothing is.
+    pub(crate) fn used_pixels(&self, row: usize) -> Range<usize> {
+        let Lattice { n, .. } = self.lattice;
+        let (first, rows) = (self.lattice.row(), self.used.get(row * n..(row + 1) * n).unwrap_or_default());
+        let offset = |(i, range): (usize, &Range<usize>)| {
+            let start = (row * n + i) * first;
+            (range.start - start, range.end - start)
+        };
+        let used = rows.iter().enumerate().filter(|(_, range)| !range.is_empty()).map(offset);
+        let (from, to) = used.fold((usize::MAX, 0), |all, own| (all.0.min(own.0), all.1.max(own.1)));
+        from.min(to) / n..to.div_ceil(n)
+    }
+
+    /// Forgets what was drawn.
+    fn clear(&mut self, lattice: Lattice) {
+        for range in self.used.drain(..) {
+            self.best[range].fill(Best::NOTHING);
+        }
+        self.lattice = lattice;
+        let n_samples = lattice.row() * lattice.row();
+        if self.best.len() < n_samples {
+            self.best.resize(n_samples, Best::NOTHING);
+            self.branch.resize(n_samples, Best::NOTHING);
+            self.surface.resize(n_samples, Surface::NOTHING);
+        }
+        self.used.resize(lattice.row(), 0..0);
     }
 
     /// Draws the listed cones. Without `joins`, each cone stands for itself.
     pub(crate) fn draw(&mut self, job: &Job<'_>, list: &[u32], lattice: Lattice, joins: bool) {
         debug_assert!(lattice.row() <= MOST_SAMPLES, "the square is larger than a tile");
-        self.lattice = lattice;
-        let n_samples = lattice.row() * lattice.row();
-        self.best.clear();
-        self.best.resize(n_samples, Best::NOTHING);
-        self.surface.clear();
-        self.surface.resize(n_samples, Surface::NOTHING);
+        self.clear(lattice);
         for &index in list {
             let cone = &job.drawn[index as usize].cone;
             let reach = reach_px(cone, job, lattice, joins);
-            for_each_sample(
-                cone,
-                (lattice, reach),
-                |_| true,
-                |sample, hit| {
-                    self.best[sample].offer(index, hit);
-                },
-            );
+            for (row, y, samples) in lattice.runs(cone, reach) {
+                let used = &mut self.used[row];
+                let from = if used.end == 0 { samples.start } else { used.start.min(samples.start) };
+                *used = from..used.end.max(samples.end);
+                for sample in samples {
+                    if let Some(hit) = cone.at(lattice.pixel(row, sample, y), reach) {
+                        self.best[sample].offer(index, hit);
+                    }
+                }
+            }
         }
-        for (best, surface) in self.best.iter().zip(&mut self.surface) {
-            if best.index != NOTHING {
-                *surface = Surface::of(job, best);
+        for range in &self.used {
+            for (best, surface) in self.best[range.clone()].iter().zip(&mut self.surface[range.clone()]) {
+                if best.index != NOTHING {
+                    *surface = Surface::of(job, best);
+                }
             }
         }
         if joins {
-            self.branch.resize(n_samples.max(self.branch.len()), Best::NOTHING);
             let branch_of = |&index: &u32| job.kinship.branch_of(job.drawn[index as usize].node);
             for of_branch in list.chunk_by(|a, b| branch_of(a) == branch_of(b)) {
                 self.join(job, of_branch);
@@ -277,25 +329,30 @@ impl Samples {
 
     /// Lets the cones of a branch join what they come near to.
     fn join(&mut self, job: &Job<'_>, of_branch: &[u32]) {
-        let Self { lattice, best, surface, branch, touched } = self;
+        let Self { lattice, best, surface, branch, touched, .. } = self;
         let node_of = |index: u32| job.drawn[index as usize].node;
         let Some(own) = of_branch.first().map(|&index| job.kinship.branch_of(node_of(index))) else { return };
         for &index in of_branch {
             let edge = &job.drawn[index as usize];
-            let is_shared = |sample: usize| best[sample].n_near > 1 && best[sample].index != index;
             let reach = reach_px(&edge.cone, job, *lattice, true);
-            for_each_sample(&edge.cone, (*lattice, reach), is_shared, |sample, hit| {
-                let winner = &best[sample];
-                if job.kinship.branch_of(node_of(winner.index)) == own {
-                    let near = Near::new(job, winner, (index, hit), lattice.fringe_px());
-                    near.chain(job, &mut surface[sample], winner);
-                    return;
+            for (row, y, samples) in lattice.runs(&edge.cone, reach) {
+                for sample in samples {
+                    let winner = &best[sample];
+                    if winner.n_near < 2 || winner.index == index {
+                        continue;
+                    }
+                    let Some(hit) = edge.cone.at(lattice.pixel(row, sample, y), reach) else { continue };
+                    if job.kinship.branch_of(node_of(winner.index)) == own {
+                        let near = Near::new(job, winner, (index, hit), lattice.fringe_px());
+                        near.chain(job, &mut surface[sample], winner);
+                        continue;
+                    }
+                    if branch[sample].index == NOTHING {
+                        touched.push(sample);
+                    }
+                    branch[sample].offer(index, hit);
                 }
-                if branch[sample].index == NOTHING {
-                    touched.push(sample);
-                }
-                branch[sample].offer(index, hit);
-            });
+            }
         }
         for sample in touched.drain(..) {
             let Best { index, hit, .. } = std::mem::replace(&mut branch[sample], Best::NOTHING);
@@ -306,11 +363,14 @@ impl Samples {
 
     /// Moves the outlines by what the fillets add to the highest cones.
     fn widen(&mut self) {
-        for (best, surface) in self.best.iter().zip(&mut self.surface) {
-            if surface.level > best.hit.level {
-                let edge_of = |level: f32, radius: f32| (radius * radius - level).max(0.0).sqrt() - radius;
-                let moved = edge_of(best.hit.level, best.hit.radius) - edge_of(surface.level, surface.radius);
-                surface.outside -= moved.max(0.0);
+        let edge_of = |level: f32, radius: f32| (radius * radius - level).max(0.0).sqrt() - radius;
+        for range in &self.used {
+            for (best, surface) in self.best[range.clone()].iter().zip(&mut self.surface[range.clone()]) {
+                if best.index != NOTHING && surface.level > best.hit.level {
+                    let moved =
+                        edge_of(best.hit.level, best.hit.radius) - edge_of(surface.level, surface.radius);
+                    surface.outside -= moved.max(0.0);
+                }
             }
         }
     }
@@ -399,31 +459,6 @@ impl<'a> Near<'a> {
             // The surfaces meet at an angle here, so the gap in height grows about as fast as the distance.
             let lower_px = best.hit.z - hit.z;
             surface.seam = surface.seam.max((1.0 - lower_px / SEAM_PX).clamp(0.0, 1.0));
-        }
-    }
-}
-
-/// Calls `visit` with each sample that a cone comes near to and that is `wanted`.
-fn for_each_sample(
-    cone: &Cone,
-    (lattice, margin): (Lattice, f32),
-    wanted: impl Fn(usize) -> bool,
-    mut visit: impl FnMut(usize, Hit),
-) {
-    let (low, high) = cone.bounds();
-    let origin = lattice.origin;
-    for row in lattice.clip(low.y - margin, high.y + margin, origin.y) {
-        let y = lattice.place(origin.y, row);
-        let Some((from, to)) = cone.span(y, margin) else { continue };
-        for column in lattice.clip(from, to, origin.x) {
-            let sample = row * lattice.row() + column;
-            if !wanted(sample) {
-                continue;
-            }
-            let pixel = Vec2::new(lattice.place(origin.x, column), y);
-            if let Some(hit) = cone.at(pixel, margin) {
-                visit(sample, hit);
-            }
         }
     }
 }
