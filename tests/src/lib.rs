@@ -99,6 +99,7 @@ fn request(source: &Path, out: &Path, overrides: &[Override], threads: usize) ->
         to: None,
         files: std::collections::BTreeMap::new(),
         force: false,
+        wait: false,
         threads: Some(threads),
         max_memory_bytes: 4 << 30,
         data_dir: None,

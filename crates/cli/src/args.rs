@@ -27,7 +27,7 @@ Examples:
 Exit codes:
   0 done   1 a bug of ours   2 usage or config   3 input malformed or empty   5 over a stated limit
   6 topology refused by policy   8 no certified layout, an altered file, or a claim that does not hold
-  73 cannot create   74 missing or unreadable file, I/O   75 another run holds the folder";
+  73 cannot create   74 missing or unreadable file, I/O   75 another run holds the folder   130, 143 cancelled";
 
 /// A CT scan of a treelike organ, airways or vessels, or a traced neuron, grown flat: one planar picture of
 /// every branch, without overlaps.
@@ -72,9 +72,6 @@ pub(crate) struct Common {
     /// Resample a tilted, uneven or incomplete DICOM series to an even grid; the same as --set input.resample=true
     #[arg(long, global = true)]
     pub(crate) resample: bool,
-    /// Do stages again also where their results stand: made from the same files and settings, and not altered since
-    #[arg(long, global = true)]
-    pub(crate) force: bool,
     /// Threads to use [default: one per core]; no result depends on it
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
@@ -146,6 +143,11 @@ pub(crate) enum Command {
     Profile(ProfileArguments),
     /// From the scan to the map and back, of a run:  espalier locate RUN X,Y,Z, or espalier locate RUN U,V
     Locate(LocateArguments),
+    /// Print a script that completes commands and options in a shell:  espalier completions bash
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
 }
 
 /// `espalier run`.
@@ -166,6 +168,19 @@ pub(crate) struct RunArguments {
     /// Do nothing; say which stages would be done, and why
     #[arg(long)]
     pub(crate) dry_run: bool,
+    #[command(flatten)]
+    pub(crate) rerun: Rerun,
+}
+
+/// How a command deals with a run folder that is in use.
+#[derive(Clone, Copy, Debug, Args)]
+pub(crate) struct Rerun {
+    /// Do stages again also where their results stand: made from the same files and settings, and not altered since
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Wait for another run that holds the folder, rather than to stop with exit code 75
+    #[arg(long)]
+    pub(crate) wait: bool,
 }
 
 const JUXTAPOSE_HELP: &str = "\
@@ -280,6 +295,8 @@ pub(crate) struct StageArguments {
     /// Take the settings from this config
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) rerun: Rerun,
 }
 
 /// `espalier verify`.

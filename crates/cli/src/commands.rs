@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::anyhow;
+use clap::CommandFactory;
 use espalier_model::Diagnose;
 use espalier_model::diagnose::Class;
 use espalier_pipeline::{
@@ -17,7 +18,7 @@ use espalier_pipeline::{
 
 use crate::args::{
     Arguments, Command, CompareArguments, JuxtaposeArguments, LocateArguments, PhantomArguments,
-    PlaceArguments, ProfileArguments, RunArguments, StageArguments, SweepArguments, VerifyArguments,
+    PlaceArguments, ProfileArguments, Rerun, RunArguments, StageArguments, SweepArguments, VerifyArguments,
 };
 use crate::checks;
 use crate::progress::{self, Progress};
@@ -45,12 +46,23 @@ pub(crate) fn execute(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Verify(verify) => return verify_folder(arguments, verify),
         Command::Profile(profile) => return print_profile(arguments, profile),
         Command::Locate(locate) => return print_located(arguments, locate),
+        Command::Completions { shell } => {
+            progress::result(completions(*shell).trim_end());
+            return Ok(());
+        }
     };
     for file in &summary.highlights {
         progress::result(&summary.out.join(file).display().to_string());
     }
     progress::result(&format!("digest {}", summary.digest));
     Ok(())
+}
+
+/// The script that completes commands and options.
+fn completions(shell: clap_complete::Shell) -> String {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Arguments::command(), "espalier", &mut script);
+    String::from_utf8_lossy(&script).into_owned()
 }
 
 /// Checks a run folder and prints what came of each claim.
@@ -171,7 +183,8 @@ fn run_pipeline(arguments: &Arguments, run: &RunArguments) -> anyhow::Result<Sum
 fn pipeline_request(arguments: &Arguments, run: &RunArguments) -> anyhow::Result<Request> {
     let loaded = load(&run.config_or_input, &arguments.common.overrides)?;
     let out = run.out.clone().unwrap_or_else(|| espalier_pipeline::run::default_folder(&loaded.config));
-    Ok(Request { from: run.from, to: run.to, ..request(arguments, loaded, out) })
+    let Rerun { force, wait } = run.rerun;
+    Ok(Request { from: run.from, to: run.to, force, wait, ..request(arguments, loaded, out) })
 }
 
 /// Prints which stages a run would do, and why.
@@ -300,7 +313,9 @@ fn run_stage_of_folder(
         *path = known.unwrap_or_else(|| std::mem::take(path));
     }
     let out = stage.out.clone().unwrap_or_else(|| folder.to_owned());
-    let mut request = Request { from: Some(which), to: Some(which), ..request(arguments, loaded, out) };
+    let Rerun { force, wait } = stage.rerun;
+    let mut request =
+        Request { from: Some(which), to: Some(which), force, wait, ..request(arguments, loaded, out) };
     if request.out != folder {
         let known = which.reads().iter().chain(&[Artifact::Traced, Artifact::Comparison]);
         let files = known.map(|artifact| (*artifact, folder.join(artifact.file())));
@@ -320,6 +335,7 @@ fn run_stage_on_files(
 ) -> anyhow::Result<Summary> {
     let overrides = &arguments.common.overrides;
     let files = stage_files(which, inputs)?;
+    let Rerun { force, wait } = stage.rerun;
     let out = stage.out.clone().ok_or_else(|| anyhow!("{which} on files needs -o DIR"))?;
     let mut loaded = match &stage.config {
         Some(config) => load(config, overrides)?,
@@ -329,7 +345,14 @@ fn run_stage_on_files(
     loaded.config.input.phantom = None;
     perform(
         arguments,
-        &Request { files, from: Some(which), to: Some(which), ..request(arguments, loaded, out) },
+        &Request {
+            files,
+            from: Some(which),
+            to: Some(which),
+            force,
+            wait,
+            ..request(arguments, loaded, out)
+        },
     )
 }
 
@@ -356,7 +379,8 @@ fn request(arguments: &Arguments, loaded: Loaded, out: PathBuf) -> Request {
         from: None,
         to: None,
         files: BTreeMap::new(),
-        force: arguments.common.force,
+        force: false,
+        wait: false,
         threads: arguments.common.threads.map(usize::from),
         max_memory_bytes: arguments.common.max_memory.unwrap_or_else(half_of_memory),
         data_dir: data_dir(),

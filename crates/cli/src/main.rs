@@ -4,6 +4,7 @@
 //! standard output, progress and errors to standard error.
 
 mod args;
+mod cancel;
 mod checks;
 mod commands;
 mod progress;
@@ -15,6 +16,7 @@ use espalier_model::diagnose::Class;
 
 fn main() -> ExitCode {
     turn_panics_into_exit_code_1();
+    cancel::end_on_signals();
     let arguments = match args::Arguments::try_parse_from(std::env::args_os().map(args::shield_point)) {
         Ok(arguments) => arguments.with_all_overrides(),
         Err(error) => {

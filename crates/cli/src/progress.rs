@@ -78,6 +78,10 @@ impl Progress {
                 finish(&mut bar);
                 line(&format!("{stage:<9}{seconds:>6.1} s  {text}"));
             }
+            Event::Waiting { out } => {
+                finish(&mut bar);
+                line(&format!("waiting for another run in {}", out.display()));
+            }
             Event::Kept { stage, line: text } => {
                 finish(&mut bar);
                 line(&format!("{stage:<9}    kept  {text}"));

@@ -391,7 +391,7 @@ impl Diagnose for Error {
             Self::TooLarge { .. } => "allow more with --max-memory".to_owned(),
             Self::Create { .. } => "choose another folder with -o".to_owned(),
             Self::Write { .. } => "check the free space and the permissions of the folder".to_owned(),
-            Self::Locked { .. } => "wait for it, or choose another folder with -o".to_owned(),
+            Self::Locked { .. } => "wait for it with --wait, or choose another folder with -o".to_owned(),
             Self::NoSuchStage { .. } | Self::EmptyRange { .. } | Self::Read { .. } | Self::Threads { .. } => {
                 String::new()
             }

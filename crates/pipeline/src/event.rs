@@ -42,6 +42,11 @@ pub enum Event {
         /// What it did, as a phrase.
         line: String,
     },
+    /// Another run holds the folder; this one waits for it.
+    Waiting {
+        /// The run folder.
+        out: PathBuf,
+    },
     /// A stage has nothing to do: its results are in place.
     Kept {
         /// The stage.

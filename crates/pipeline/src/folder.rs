@@ -1,7 +1,7 @@
 //! The run folder: atomic files, digests, one lock.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -10,9 +10,9 @@ use atomic_write_file::AtomicWriteFile;
 use sha2::{Digest, Sha256};
 
 use crate::error::Error;
+use crate::lock::{Lock, Patience};
 
 const DIGEST_FILE: &str = "SHA256SUMS";
-const LOCK_FILE: &str = ".lock";
 
 /// A run folder, held by this process alone while the value lives.
 pub(crate) struct RunFolder {
@@ -23,28 +23,24 @@ pub(crate) struct RunFolder {
     reads: Mutex<BTreeSet<String>>,
     /// The folders that this run made, the innermost first.
     made: Vec<PathBuf>,
-    /// The system releases the lock with the handle, however the process ends. None for a folder that is only read.
-    _lock: Option<File>,
+    /// None for a folder that is only read.
+    _lock: Option<Lock>,
 }
 
 impl RunFolder {
     /// Opens or makes the folder and takes its lock.
     pub(crate) fn open(path: &Path) -> Result<Self, Error> {
-        let create = |source| Error::Create { path: path.to_owned(), source };
+        Self::open_or_wait(path, Patience::None)
+    }
+
+    /// As [`Self::open`]; if another run holds the folder, as patience has it.
+    pub(crate) fn open_or_wait(path: &Path, patience: Patience<'_>) -> Result<Self, Error> {
         let made = path
             .ancestors()
             .take_while(|folder| !folder.as_os_str().is_empty() && !folder.exists())
             .map(Path::to_owned)
             .collect();
-        fs::create_dir_all(path).map_err(create)?;
-        let lock = File::create(path.join(LOCK_FILE)).map_err(create)?;
-        match lock.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => return Err(Error::Locked { folder: path.to_owned() }),
-            // A file system without locks (some network mounts) still serves a single run.
-            Err(TryLockError::Error(source)) if source.kind() == io::ErrorKind::Unsupported => {}
-            Err(TryLockError::Error(source)) => return Err(create(source)),
-        }
+        let lock = Lock::take(path, patience)?;
         let digests = read_digests(&path.join(DIGEST_FILE));
         Ok(Self { path: path.to_owned(), digests, reads: Mutex::default(), made, _lock: Some(lock) })
     }
@@ -64,7 +60,7 @@ impl RunFolder {
     pub(crate) fn remove_if_unused(&self) {
         if !self.made.is_empty() && self.digests.is_empty() {
             // Only empty folders can be removed, so nothing is lost where this fails.
-            let _ = fs::remove_file(self.path.join(LOCK_FILE));
+            Lock::remove_file(&self.path);
             self.made.iter().take_while(|folder| fs::remove_dir(folder).is_ok()).for_each(drop);
         }
     }

@@ -10,7 +10,7 @@
 //! | methods and runs side by side | [`compare`](mod@compare) |
 //! | two runs on one shared map | [`juxtapose`](mod@juxtapose) |
 //! | a config at many settings | [`sweep`](mod@sweep) |
-//! | the run folder: atomic files, digests, one lock | `folder` |
+//! | the run folder: atomic files, digests; one run at a time | `folder`, `lock` |
 //! | what a stage's results were made from, and whether they still stand | `record` |
 //! | how a result came about, what each method cost | `provenance`, `methods` |
 //! | the page of a run: what it is made from | `page` |
@@ -34,6 +34,7 @@ mod event;
 mod folder;
 pub mod juxtapose;
 pub mod locate;
+mod lock;
 mod methods;
 mod page;
 mod phantom;

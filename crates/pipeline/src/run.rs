@@ -11,6 +11,7 @@ use crate::config::{Config, Loaded, Source, Unit};
 use crate::error::Error;
 use crate::event::Event;
 use crate::folder::{RunFolder, hex_digest};
+use crate::lock::Patience;
 use crate::provenance::{self, StageCost};
 use crate::record::{MadeFrom, Reason, Record};
 use crate::settings::Settings;
@@ -33,6 +34,8 @@ pub struct Request {
     pub files: BTreeMap<Artifact, PathBuf>,
     /// Whether stages are done also where their results stand.
     pub force: bool,
+    /// Whether to wait for another run that holds the folder, rather than to stop.
+    pub wait: bool,
     /// Threads; `None` for one per core. No result depends on it.
     pub threads: Option<usize>,
     /// The most memory that reading a file may take, in bytes.
@@ -76,7 +79,9 @@ pub(crate) fn in_pool<T: Send>(
 
 fn run_stages(request: &Request, events: &(dyn Fn(Event) + Sync)) -> Result<Summary, Error> {
     let (mut run, stages) = prepare(request, events)?;
-    let mut folder = RunFolder::open(&request.out)?;
+    let say_so = || events(Event::Waiting { out: request.out.clone() });
+    let patience = if request.wait { Patience::Wait(&say_so) } else { Patience::None };
+    let mut folder = RunFolder::open_or_wait(&request.out, patience)?;
     folder.forget_unless(is_known);
     let done = run.perform(&mut folder, &stages);
     if done.is_err() {

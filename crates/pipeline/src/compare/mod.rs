@@ -76,6 +76,7 @@ impl Subject {
             to: Some(to),
             files: std::collections::BTreeMap::new(),
             force: false,
+            wait: false,
             threads,
             max_memory_bytes,
             data_dir,

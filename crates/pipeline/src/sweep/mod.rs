@@ -249,6 +249,7 @@ fn request_of(
         to: Some(to),
         files: BTreeMap::new(),
         force: false,
+        wait: false,
         threads: request.threads,
         max_memory_bytes: request.max_memory_bytes,
         data_dir: request.data_dir.clone(),
