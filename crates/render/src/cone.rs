@@ -231,23 +231,29 @@ impl Cone {
 
     /// The pixels x of a row at height `y` that the cone can reach when it is `margin` wider: low and high.
     pub(crate) fn span(&self, y: f32, margin: f32) -> Option<(f32, f32)> {
+        self.span_between([y, y], margin)
+    }
+
+    /// The same for all rows from one height to another.
+    pub(crate) fn span_between(&self, [top, bottom]: [f32; 2], margin: f32) -> Option<(f32, f32)> {
         let (low, high) = self.bounds();
         let mut span = (low.x - margin, high.x + margin);
         let wide = self.radii[0].max(self.radii[1]) + margin;
         let across = Vec2::new(-self.along.y, self.along.x);
-        let rel_y = y - self.start.y;
-        // along · (x, y) within the range, across · (x, y) within the width: two strips cut by the row.
+        let rows = [top - self.start.y, bottom - self.start.y];
+        // along · (x, y) within the range, across · (x, y) within the width: two strips cut by the rows.
         for (normal, [from, to]) in [(self.along, self.range), (across, [-wide, wide])] {
+            let [p, q] = rows.map(|row| normal.y * row);
+            let (least, most) = (p.min(q), p.max(q));
             if normal.x.abs() < 1e-4 {
-                let at = normal.y * rel_y;
-                // The row runs nearly along the strip: a pixel of slack covers the tilt over any page.
-                if at < from - 4.0 || at > to + 4.0 {
+                // The rows run nearly along the strip: a pixel of slack covers the tilt over any page.
+                if most < from - 4.0 || least > to + 4.0 {
                     return None;
                 }
                 continue;
             }
-            let cut = |bound: f32| self.start.x + (bound - normal.y * rel_y) / normal.x;
-            let (p, q) = (cut(from), cut(to));
+            let cut = |bound: f32| self.start.x + bound / normal.x;
+            let (p, q) = (cut(from - most), cut(to - least));
             span = (span.0.max(p.min(q)), span.1.min(p.max(q)));
         }
         (span.0 <= span.1).then_some(span)

@@ -8,7 +8,7 @@
 //! | 3 | `heading`, `furniture`, `text` | what stands beside the tree, and how much room it needs |
 //! | 4 | `page` | scale and places |
 //! | 5 | `sketch`, `cone`, `kinship` | edges as round cones in pixels |
-//! | 6 | `raster`, `samples`, `shade` | the pixels |
+//! | 6 | `raster`, `tiles`, `samples`, `shade` | the pixels |
 //! | 7 | `paint`, `svg`, `outline`, `layers` | the files |
 //! | 8 | `side_by_side`, `tiling`, `parts`; `juxtaposed`; `chart`, `convergence`, `profile` | several layouts in one figure; two trees on one map; charts of numbers |
 //!
@@ -41,6 +41,7 @@ mod sketch;
 mod raster;
 mod samples;
 mod shade;
+mod tiles;
 
 mod layers;
 mod outline;

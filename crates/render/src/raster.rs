@@ -14,24 +14,19 @@
 //! **Cost** O(sum of the cones' areas + E) time; 36 bytes a pixel of the bands in work. [`layers`] tells that sum
 //! beforehand.
 
-use std::ops::RangeInclusive;
-
-use glam::Vec2;
-use rayon::prelude::*;
-
 use crate::cone::Cone;
 use crate::kinship::Kinship;
 use crate::palette::{PageColors, Palette, to_byte};
 use crate::params::Style;
 use crate::samples::{Best, GAP_PX, Lattice, Samples};
 use crate::shade::{self, Place};
+use crate::tiles::{self, Crowd, Tiles};
+use glam::Vec2;
 
 /// Pixels per tile and axis.
 pub(crate) const TILE: usize = 32;
 /// Samples per pixel and axis where one is not enough; odd, so that one sample is the pixel's centre.
 const FINE: usize = 3;
-/// A cone as thin as this turns from light to shade within a pixel.
-const THIN_PX: f32 = 2.0;
 /// Tiles that cones cover more often than this get one sample a pixel. Organs at their true widths stay below: no
 /// pixel of the airway, vessel and neuron phantoms' pictures changes by it.
 const FINE_LAYERS: f64 = 12.0;
@@ -40,8 +35,6 @@ const FINE_LAYERS: f64 = 12.0;
 const STEP: f32 = 0.5;
 /// Places farther apart along the tree than this, in their radii, are distant parts.
 const DISTANT: f32 = 4.0;
-/// Beyond this mean over the tiles that are not empty nobody can see what blends with what.
-const PLAIN_LAYERS: f64 = 16.0;
 /// What an edge of a few pixels may take, in pixels, without being counted: however many they are, they must be drawn.
 const SLENDER_PX: f64 = 256.0;
 /// No edge.
@@ -121,7 +114,7 @@ pub(crate) fn layers(size: [usize; 2], drawn: &[Drawn]) -> f64 {
     let looked_at: f64 = drawn
         .iter()
         .map(|edge| {
-            let [columns, rows] = tiles_of(size, edge);
+            let [columns, rows] = tiles::around(size, edge);
             // In each tile a row is looked at even where the cone does not meet it.
             let n_rows = TILE * columns.count() * rows.count();
             (edge.cone.area(GAP_PX) + n_rows as f64 - SLENDER_PX).max(0.0)
@@ -130,23 +123,11 @@ pub(crate) fn layers(size: [usize; 2], drawn: &[Drawn]) -> f64 {
     looked_at / (size[0] * size[1]).max(1) as f64
 }
 
-/// The tiles that an edge touches: columns and rows.
-fn tiles_of(size: [usize; 2], edge: &Drawn) -> [RangeInclusive<usize>; 2] {
-    let (low, high) = edge.cone.bounds();
-    let reach = edge.cone.fillet_px().max(GAP_PX) + 1.0;
-    // Casts saturate, so what lies off the page ends on its border.
-    let range = |low: f32, high: f32, n_pixels: usize| {
-        let tile = |at: f32| ((at / TILE as f32) as usize).min(n_pixels.div_ceil(TILE) - 1);
-        tile(low - reach - 1.0)..=tile(high + reach + 1.0)
-    };
-    [range(low.x, high.x, size[0]), range(low.y, high.y, size[1])]
-}
-
 /// A picture, ready to be drawn band by band.
 pub(crate) struct Raster<'a> {
     job: Job<'a>,
     tiles: Tiles,
-    n_layers: Vec<f64>,
+    crowds: Vec<Crowd>,
     is_plain: bool,
 }
 
@@ -165,10 +146,9 @@ impl Brush {
 impl<'a> Raster<'a> {
     /// Sorts the cones.
     pub(crate) fn new(job: Job<'a>) -> Self {
-        let tiles = Tiles::sort(&job);
-        let n_layers = tiles.layers(&job);
-        let is_plain = is_plain(&n_layers);
-        Self { job, tiles, n_layers, is_plain }
+        let crowds = tiles::crowds(&job);
+        let is_plain = tiles::is_plain(&crowds);
+        Self { job, tiles: Tiles::sort(&job), crowds, is_plain }
     }
 
     /// Width and height in pixels.
@@ -198,9 +178,9 @@ impl<'a> Raster<'a> {
     /// Draws one tile into its band.
     fn tile(&self, [column, band]: [usize; 2], list: &[u32], (brush, pixels): (&mut Brush, &mut [Pixel])) {
         let (job, width) = (&self.job, self.job.size[0]);
-        let is_thin = |&index: &u32| job.drawn[index as usize].cone.least_radius() < THIN_PX;
-        let is_crowded = self.n_layers[band * self.tiles.n_x + column] > FINE_LAYERS;
-        let n = if !self.is_plain && !is_crowded && list.iter().any(is_thin) { FINE } else { 1 };
+        let Crowd { n_layers, has_thin } = self.crowds[band * self.tiles.n_x + column];
+        let is_crowded = n_layers > FINE_LAYERS;
+        let n = if !self.is_plain && !is_crowded && has_thin { FINE } else { 1 };
         let corner = Vec2::new((column * TILE) as f32, (band * TILE) as f32);
         // One sample a pixel looks over the border, to compare neighbours.
         let rim = usize::from(n == 1);
@@ -287,67 +267,5 @@ fn resolve(job: &Job<'_>, samples: &Samples, [x, y]: [usize; 2]) -> Pixel {
         normal: surface.normal().to_array(),
         across_px: edge.cone.across(&best.hit),
         color: color.map(|part| to_byte(part / covered)),
-    }
-}
-
-/// Whether most of the picture is too crowded for blending: all of it then goes without, for a tile that does not blend
-/// looks otherwise than its neighbour that does.
-fn is_plain(n_layers: &[f64]) -> bool {
-    let n_drawn = n_layers.iter().filter(|&&n| n > 0.0).count().max(1);
-    n_layers.iter().sum::<f64>() / n_drawn as f64 > PLAIN_LAYERS
-}
-
-/// Which edges touch which tile.
-struct Tiles {
-    n_x: usize,
-    offsets: Vec<usize>,
-    entries: Vec<u32>,
-}
-
-impl Tiles {
-    fn sort(job: &Job<'_>) -> Self {
-        let [n_x, n_y] = job.size.map(|pixels| pixels.div_ceil(TILE));
-        let mut offsets = vec![0; n_x * n_y + 1];
-        let visit = |edge: &Drawn, visitor: &mut dyn FnMut(usize)| {
-            let [columns, rows] = tiles_of(job.size, edge);
-            for tile_y in rows {
-                for tile_x in columns.clone() {
-                    visitor(tile_y * n_x + tile_x);
-                }
-            }
-        };
-        for edge in job.drawn {
-            visit(edge, &mut |tile| offsets[tile + 1] += 1);
-        }
-        for tile in 0..n_x * n_y {
-            offsets[tile + 1] += offsets[tile];
-        }
-        let mut next = offsets.clone();
-        let mut entries = vec![0; offsets[n_x * n_y]];
-        for (index, edge) in job.drawn.iter().enumerate() {
-            visit(edge, &mut |tile| {
-                entries[next[tile]] = index as u32;
-                next[tile] += 1;
-            });
-        }
-        Self { n_x, offsets, entries }
-    }
-
-    /// By tile: about how often its cones cover it. Where ten thousand branches leave one root, all are in the tiles
-    /// around it.
-    fn layers(&self, job: &Job<'_>) -> Vec<f64> {
-        let of_tile = |tile: usize| {
-            let (tile_x, tile_y) = (tile % self.n_x, tile / self.n_x);
-            let low = Vec2::new((tile_x * TILE) as f32, (tile_y * TILE) as f32);
-            let corners = (low, low + TILE as f32);
-            let area = |&index: &u32| job.drawn[index as usize].cone.area_within(corners, GAP_PX);
-            self.list(tile_x, tile_y).iter().map(area).sum::<f64>() / (TILE * TILE) as f64
-        };
-        (0..self.offsets.len() - 1).into_par_iter().map(of_tile).collect()
-    }
-
-    fn list(&self, tile_x: usize, tile_y: usize) -> &[u32] {
-        let tile = tile_y * self.n_x + tile_x;
-        &self.entries[self.offsets[tile]..self.offsets[tile + 1]]
     }
 }

@@ -196,8 +196,8 @@ impl Lattice {
     fn clip(self, low: f32, high: f32, from: f32) -> Range<usize> {
         let index = |at: f32| (at - from) * self.n as f32 - 0.5;
         // Casts saturate at 0; one sample of slack on either side covers rounding.
-        let first = (index(low) - 1.0) as usize;
-        let last = (index(high) + 2.0).max(0.0) as usize;
+        let first = (index(low) - 1.0) as u32 as usize;
+        let last = (index(high) + 2.0).max(0.0) as u32 as usize;
         first..last.min(self.row())
     }
 
