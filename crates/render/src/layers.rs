@@ -301,3 +301,47 @@ fn deflate(bytes: &[u8]) -> Option<Vec<u8>> {
     packed.shrink_to_fit();
     matches!(status, Ok(Status::StreamEnd)).then_some(packed)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn floor_is_the_whole_number_below() {
+        for (number, below) in
+            [(2.5, 2.0), (-2.5, -3.0), (-3.0, -3.0), (0.0, 0.0), (1e15, 1e15), (-0.2, -1.0)]
+        {
+            assert_eq!(floor(number), below);
+            assert_eq!(floor(number), math::floor(number));
+        }
+    }
+
+    #[test]
+    fn a_block_is_split_and_its_bytes_become_differences() {
+        let mut halves = Halves::with_room(64);
+        halves.take(&[1.0; 64], F32);
+        halves.take(&[2.0; 64], F16);
+        // 1.0 is 00 00 80 3f, 2.0 is 00 40.
+        assert_eq!(halves.even[..4], [0x00, 0x80, 0x00, 0x80]);
+        assert_eq!(halves.odd[..4], [0x00, 0x3f, 0x00, 0x3f]);
+        assert_eq!((halves.even[128], halves.odd[128]), (0x00, 0x40));
+        let bytes = [halves.even.clone(), halves.odd.clone()].concat();
+        let mut plain = vec![0; bytes.len()];
+        let mut unpacker = flate2::Decompress::new(true);
+        unpacker
+            .decompress(&halves.packed(), &mut plain, flate2::FlushDecompress::Finish)
+            .expect("a zlib stream");
+        for i in 1..plain.len() {
+            plain[i] = plain[i].wrapping_add(plain[i - 1]).wrapping_sub(128);
+        }
+        assert_eq!(plain, bytes);
+    }
+
+    #[test]
+    fn what_does_not_get_smaller_is_stored_as_it_is() {
+        let mut halves = Halves::with_room(2);
+        halves.take(&[1.5, -2.25], F32);
+        let plain: Vec<u8> = [1.5_f32, -2.25].iter().flat_map(|value| value.to_le_bytes()).collect();
+        assert_eq!(halves.packed(), plain);
+    }
+}

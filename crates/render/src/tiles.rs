@@ -133,3 +133,47 @@ pub(crate) fn is_plain(crowds: &[Crowd]) -> bool {
     let n_drawn = n_layers.clone().filter(|&n| n > 0.0).count().max(1);
     n_layers.sum::<f64>() / n_drawn as f64 > PLAIN_LAYERS
 }
+
+#[cfg(test)]
+mod tests {
+    use espalier_geom::random::{Purpose, Stream};
+    use glam::DVec3;
+
+    use super::*;
+    use crate::cone::{Ball, Cone, Joint};
+
+    #[test]
+    fn a_cone_is_listed_wherever_it_is_near() {
+        let size = [300, 200];
+        let mut stream = Stream::new(7, Purpose::Test, 0, 0);
+        for case in 0..300 {
+            let mut ball = |flat: bool| Ball {
+                center: DVec3::new(
+                    stream.uniform(-40.0, 340.0),
+                    if flat { 90.0 } else { stream.uniform(-40.0, 240.0) },
+                    stream.uniform(-40.0, 40.0),
+                ),
+                radius: stream.uniform(0.3, 12.0),
+            };
+            // Some lie along the rows.
+            let flat = case % 5 == 0;
+            let cone = Cone::new(ball(flat), ball(flat), [Joint::End; 2]);
+            let edge = Drawn { node: 0, cone, values: [0.0; 2], arc_px: [0.0; 2] };
+            let mut listed = [[false; 10]; 7];
+            visit(size, &edge, |column, row| listed[row][column] = true);
+            let reach = cone.fillet_px().max(GAP_PX);
+            for y in 0..size[1] {
+                for x in 0..size[0] {
+                    let pixel = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+                    if cone.at(pixel, reach).is_some() {
+                        // The tile of the pixel, and those that look one pixel over their borders.
+                        for (x, y) in [(x, y), (x + 1, y), (x.max(1) - 1, y), (x, y + 1), (x, y.max(1) - 1)] {
+                            let [column, row] = [(x / TILE).min(9), (y / TILE).min(6)];
+                            assert!(listed[row][column], "case {case}: {x} {y}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
