@@ -13,6 +13,10 @@ Examples:
   espalier run chest-ct.nii.gz --preset airway          airways, from the trachea to before the leak
   espalier run scan.nii.gz --set volume.method=region-grow \\
       --set volume.upper=-865 --set 'volume.seed_voxel=[58,80,85]'
+  espalier run chest-ct.nii.gz --preset airway --set render.style=volume
+                                                        the scan along the airways: a reformation of the whole tree
+  espalier render out/bronchi --set render.style=volume --image chest-ct.nii.gz
+                                                        the same of a run that began with a mask
   espalier run dicom/ --series 2 --set volume.method=threshold --set volume.lower=200
                                                         a folder of DICOM slices; of several series the second
   espalier run my.toml --from embed --set embed.w_angle=3    again from a stage on
@@ -57,6 +61,10 @@ pub(crate) struct Common {
     /// lung"); short for --set input.labels
     #[arg(long, global = true, value_name = "FILE")]
     pub(crate) labels: Option<PathBuf>,
+    /// The scan that --set render.style=volume shows along the branches, where the input is a mask, a label map or a
+    /// traced tree; short for --set render.volume.image
+    #[arg(long, global = true, value_name = "FILE")]
+    pub(crate) image: Option<PathBuf>,
     /// Which volume of a 4D file, from 0; the same as --set input.volume_index=N
     #[arg(long, global = true, value_name = "N")]
     pub(crate) volume_index: Option<u32>,
@@ -98,12 +106,14 @@ impl Arguments {
         // From here, not from the config's folder.
         let from_here = |path: PathBuf| std::path::absolute(&path).unwrap_or(path);
         let labels = common.labels.take().map(|path| set("input.labels", format!("{:?}", from_here(path))));
+        let image =
+            common.image.take().map(|path| set("render.volume.image", format!("{:?}", from_here(path))));
         let index = common.volume_index.map(|index| set("input.volume_index", index.to_string()));
         let space = common.assume_space.take().map(|space| set("input.assume_space", space));
         let strict = common.strict.then(|| set("input.strict", "true".to_owned()));
         common
             .overrides
-            .extend([label, labels, index, space, strict, series, resample].into_iter().flatten());
+            .extend([label, labels, image, index, space, strict, series, resample].into_iter().flatten());
         self
     }
 }

@@ -113,6 +113,49 @@ impl Artifacts {
         self.read_volume(&path, lookup.stage).map(|loaded| loaded.volume)
     }
 
+    /// What the scan has between two corners of the world, RAS+ mm: of the file that the config names for the map, else
+    /// of the run's own input; with its path.
+    pub(crate) fn scan_of_map(
+        &self,
+        lookup: Lookup<'_>,
+        corners_mm: [DVec3; 2],
+    ) -> Result<(espalier_volume::Cropped, PathBuf), Error> {
+        let side = self.side_paths.get(&SideFile::Image);
+        let (path, options) = match side {
+            Some(path) => (path.clone(), self.beside_options()),
+            None => (self.locate(Artifact::Volume, lookup)?, self.read_options),
+        };
+        let mut cropped = espalier_volume::read_box(&path, &options, corners_mm)
+            .map_err(|error| Error::stage(lookup.stage)(Box::new(error)))?;
+        if side.is_none() {
+            // The volume stage has said it.
+            cropped.report = Report::default();
+        }
+        Ok((cropped, path))
+    }
+
+    /// The files that one beside the input is made of: several where it is a DICOM series; none if there is none.
+    pub(crate) fn files_beside(&self, side: SideFile, stage: Stage) -> Result<Vec<PathBuf>, Error> {
+        let Some(path) = self.side_paths.get(&side) else { return Ok(Vec::new()) };
+        if side != SideFile::Image {
+            return Ok(vec![path.clone()]);
+        }
+        espalier_volume::files(path, &self.beside_options())
+            .map_err(|error| Error::stage(stage)(Box::new(error)))
+    }
+
+    /// How volumes beside the input are read. Volume, series, unit and resampling are the input's own. What space a file
+    /// without one is in is not: both come from the same program, mostly.
+    fn beside_options(&self) -> espalier_volume::ReadOptions {
+        espalier_volume::ReadOptions {
+            volume_index: None,
+            unit_mm: None,
+            series: None,
+            resample: false,
+            ..self.read_options
+        }
+    }
+
     /// The traced tree, with what its reader had to say.
     pub(crate) fn traced(&mut self, lookup: Lookup<'_>) -> Result<(Arc<Traced>, Report), Error> {
         if let Some(traced) = &self.traced {
@@ -234,16 +277,7 @@ impl Artifacts {
     /// The label map that branches are labelled by; none if the config names no file of one.
     pub(crate) fn label_map(&self, lookup: Lookup<'_>, reach_mm: f64) -> Result<Option<LabelMap>, Error> {
         let Some(path) = self.side_paths.get(&SideFile::Labels) else { return Ok(None) };
-        // Volume, series, unit and resampling are the input's own. What space a file without one is in is not: both
-        // come from the same program, mostly.
-        let options = espalier_volume::ReadOptions {
-            volume_index: None,
-            unit_mm: None,
-            series: None,
-            resample: false,
-            ..self.read_options
-        };
-        let loaded = espalier_volume::read(path, &options)
+        let loaded = espalier_volume::read(path, &self.beside_options())
             .map_err(|error| Error::stage(lookup.stage)(Box::new(error)))?;
         espalier_volume::check_regions(&loaded.volume).map_err(|error| Error::file(path, error))?;
         let names = match self.side_paths.get(&SideFile::LabelNames) {

@@ -42,6 +42,7 @@ mod profile;
 mod provenance;
 mod record;
 pub mod run;
+mod scan_of_map;
 mod settings;
 mod side_file;
 pub mod stage;

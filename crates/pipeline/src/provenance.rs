@@ -93,19 +93,21 @@ pub(crate) fn input_rows(input: &[PathBuf]) -> Result<String, Error> {
     input.iter().map(|path| row(INPUT, path)).collect()
 }
 
-/// Brings the row of a file beside the input in `provenance/inputs.tsv` up to date.
+/// Brings the rows of a file beside the input in `provenance/inputs.tsv` up to date: several of a DICOM series.
 pub(crate) fn write_side_file(
     folder: &mut RunFolder,
     side: SideFile,
-    path: Option<&PathBuf>,
+    files: &[PathBuf],
 ) -> Result<(), Error> {
     let known = rows(folder)?;
-    if known.is_none() && path.is_none() {
+    if known.is_none() && files.is_empty() {
         return Ok(());
     }
     let known = known.unwrap_or_else(|| Table::with(&INPUT_COLUMNS).into_string());
     let mut table: String = known.split_inclusive('\n').filter(|row| !is_of(side.role(), row)).collect();
-    table.extend(path.map(|path| row(side.role(), path)).transpose()?);
+    for path in files {
+        table.push_str(&row(side.role(), path)?);
+    }
     folder.write(INPUTS_FILE, table.as_bytes())
 }
 

@@ -14,6 +14,7 @@ use crate::folder::{RunFolder, hex_digest};
 use crate::lock::Patience;
 use crate::provenance::{self, StageCost};
 use crate::record::{MadeFrom, Reason, Record};
+use crate::scan_of_map;
 use crate::settings::Settings;
 use crate::side_file::SideFile;
 use crate::stage::{Artifact, Stage};
@@ -103,12 +104,18 @@ fn prepare<'a>(
 ) -> Result<(Run<'a>, Vec<Stage>), Error> {
     let source = resolve_source(request)?;
     let stages = stages_to_do(request, &source)?;
+    if stages.contains(&Stage::Render) {
+        let refused = |problem| Error::stage(Stage::Render)(boxed(problem));
+        scan_of_map::check(&request.loaded.config, &source).map_err(refused)?;
+    }
     let artifacts = artifacts_of(request, &source);
     let input = input_file(&stages, &artifacts);
     let sides = artifacts.side_paths.iter().filter(|(side, _)| stages.contains(&side.stage()));
-    for path in input.iter().chain(sides.map(|(_, path)| path)) {
-        let may_be_folder = matches!(source, Source::Volume(_)) && Some(path) == input.as_ref();
-        steps::check_readable(path, may_be_folder)?;
+    if let Some(input) = &input {
+        steps::check_readable(input, matches!(source, Source::Volume(_)))?;
+    }
+    for (side, path) in sides {
+        steps::check_readable(path, *side == SideFile::Image)?;
     }
     let run = Run {
         request,
@@ -271,7 +278,7 @@ impl Run<'_> {
             provenance::write_inputs(folder, self.input_rows.as_deref().unwrap_or_default())?;
         }
         for side in SideFile::ALL.into_iter().filter(|side| side.stage() == stage) {
-            provenance::write_side_file(folder, side, self.artifacts.side_paths.get(&side))?;
+            provenance::write_side_file(folder, side, &self.artifacts.files_beside(side, stage)?)?;
         }
         settings.adopt(folder, stage)
     }
@@ -294,7 +301,17 @@ impl Run<'_> {
             facts.extend(folder.digest(&file).cloned().map(|digest| (file, digest)));
         }
         for (side, path) in self.artifacts.side_paths.iter().filter(|(side, _)| side.stage() == stage) {
-            facts.insert(side.key().to_owned(), provenance::digest(path)?);
+            let digest = match self.artifacts.files_beside(*side, stage)?.as_slice() {
+                [one] if one == path => provenance::digest(path)?,
+                files => hex_digest(provenance::input_rows(files)?.as_bytes()),
+            };
+            facts.insert(side.key().to_owned(), digest);
+        }
+        // A map that shows the run's own input depends on it.
+        let shows_input = stage == Stage::Render && scan_of_map::is_of_input(&self.request.loaded.config);
+        if let (true, Some(path)) = (shows_input, self.artifacts.files.get(&Artifact::Volume)) {
+            let rows = provenance::input_rows(&input_files(&self.source, &self.artifacts, (stage, path))?)?;
+            facts.insert(Artifact::Volume.what().to_owned(), hex_digest(rows.as_bytes()));
         }
         Ok(MadeFrom(facts))
     }

@@ -99,7 +99,8 @@ fn concerns(stage: Stage, key: &str) -> bool {
             table == "input" || key == "volume.orientation"
         }
         Stage::Views | Stage::Embed => table == "seed",
-        Stage::Render => table == "name",
+        // The map may show the scan, which is read as the input says.
+        Stage::Render => matches!(table, "name" | "input"),
     };
     is_shared || table == "schema" || table == stage.name()
 }

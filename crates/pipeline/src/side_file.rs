@@ -16,12 +16,14 @@ pub enum SideFile {
     Edits,
     /// `embed.marino.view_file`: the view of the baseline.
     MarinoView,
+    /// `render.volume.image`: the scan on the map.
+    Image,
 }
 
 impl SideFile {
     /// All of them.
-    pub const ALL: [Self; 5] =
-        [Self::InputLabels, Self::Labels, Self::LabelNames, Self::Edits, Self::MarinoView];
+    pub const ALL: [Self; 6] =
+        [Self::InputLabels, Self::Labels, Self::LabelNames, Self::Edits, Self::MarinoView, Self::Image];
 
     /// The name in provenance.
     pub(crate) fn role(self) -> &'static str {
@@ -31,6 +33,7 @@ impl SideFile {
             Self::LabelNames => "label_names",
             Self::Edits => "edits",
             Self::MarinoView => "marino_view",
+            Self::Image => "image",
         }
     }
 
@@ -43,6 +46,7 @@ impl SideFile {
             Self::LabelNames => "tree.label_names",
             Self::Edits => "embed.edits",
             Self::MarinoView => "embed.marino.view_file",
+            Self::Image => "render.volume.image",
         }
     }
 
@@ -52,6 +56,7 @@ impl SideFile {
             Self::InputLabels => Stage::Volume,
             Self::Labels | Self::LabelNames => Stage::Tree,
             Self::Edits | Self::MarinoView => Stage::Embed,
+            Self::Image => Stage::Render,
         }
     }
 
@@ -64,6 +69,7 @@ impl SideFile {
             Self::LabelNames => &mut config.tree.label_names,
             Self::Edits => &mut config.embed.edits,
             Self::MarinoView => &mut config.embed.marino.view_file,
+            Self::Image => &mut config.render.volume.image,
         }
     }
 
@@ -75,6 +81,7 @@ impl SideFile {
             Self::LabelNames => &config.tree.label_names,
             Self::Edits => &config.embed.edits,
             Self::MarinoView => &config.embed.marino.view_file,
+            Self::Image => &config.render.volume.image,
         };
         path.as_deref().filter(|path| !path.is_empty())
     }

@@ -121,7 +121,10 @@ impl Stage {
     pub(crate) fn reads_beside(self) -> Vec<String> {
         match self {
             Self::Tree => [DROPPED_FILE, Artifact::Traced.file()].map(str::to_owned).into(),
-            Self::Render => vec![Artifact::Comparison.file().to_owned()],
+            // The scan only for a map that shows it.
+            Self::Render => {
+                [Artifact::Comparison, Artifact::Volume].map(|read| read.file().to_owned()).into()
+            }
             Self::Report => {
                 let earlier = Self::ALL.into_iter().filter(|other| *other < self).flat_map(Self::writes);
                 earlier.chain([INPUTS_FILE.to_owned()]).collect()

@@ -10,6 +10,7 @@ use espalier_model::{
     Comparison, Embedding, Grid, GridError, InscribedSpheres, Ledger, LedgerKind, Mask, MethodRow, Report,
     Termination, TracePoint, Tree, ViewHierarchy, nifti_out, swc,
 };
+use espalier_render::Style;
 
 use crate::artifacts::{Artifacts, Lookup, SOURCE_KEY, SOURCE_SCAN, SOURCE_TRACING};
 use crate::compare::figure;
@@ -23,6 +24,7 @@ use crate::page;
 use crate::phantom;
 use crate::provenance::PartCost;
 use crate::run::boxed;
+use crate::scan_of_map;
 use crate::stage::{Artifact, Stage};
 use crate::tree_outputs::{self, Made};
 
@@ -283,8 +285,14 @@ fn render(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let mut params = step.config.render.clone();
     params.title = params.title.or_else(|| step.config.own_name().map(str::to_owned));
     params.compass = figure::compass(params.compass, step.artifacts.is_of_scan);
-    let made =
-        espalier_render::render(&tree, &embedding, &views, &params).map_err(|error| step.failed(error))?;
+    let (made, report) = if params.style == Style::Volume {
+        let (scan, report) = scan_of_map::of_tree(step, &tree, &params)?;
+        (espalier_render::render_scan((&tree, &embedding, &views), &scan, &params), report)
+    } else {
+        (espalier_render::render(&tree, &embedding, &views, &params), Report::default())
+    };
+    let made = made.map_err(|error| step.failed(error))?;
+    let report = Report { warnings: [report.warnings, made.report.warnings].concat(), ..made.report };
     let mut files = vec![
         ("planar.png".to_owned(), made.png),
         ("planar.svg".to_owned(), made.svg.into_bytes()),
@@ -304,7 +312,7 @@ fn render(step: &mut Step<'_>) -> Result<Outcome, Error> {
         files.extend(figure::convergence(&comparison, &params).map_err(|error| step.failed(error))?);
     }
     let line = files.iter().map(|(file, _)| file.as_str()).collect::<Vec<_>>().join(", ");
-    Ok(Outcome { files, report: made.report, line })
+    Ok(Outcome { files, report, line })
 }
 
 impl<'a> Step<'a> {

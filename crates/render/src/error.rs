@@ -40,6 +40,21 @@ pub enum Error {
         /// Its up.
         up: glam::DVec3,
     },
+    /// A picture of a scan without one.
+    #[error("style = \"volume\" shows a scan along the branches, and there is none")]
+    NoScan,
+    /// A scan of something else, or in another space.
+    #[error(
+        "only {percent:.0} % of the tree's nodes lie in the scan; it holds {scan}, the tree lies in {tree} (RAS+ mm)"
+    )]
+    Elsewhere {
+        /// How many nodes lie in it.
+        percent: f64,
+        /// The box of the scan, as far as it was read.
+        scan: String,
+        /// The box of the tree.
+        tree: String,
+    },
     /// A picture that is too large.
     #[error("a picture of {width} × {height} pixels is over the limit of {limit} pixels")]
     TooLarge {
@@ -68,6 +83,8 @@ impl Diagnose for Error {
             Self::Mismatch { .. } => "E-RENDER-MISMATCH",
             Self::Number { .. } => "E-RENDER-NUMBER",
             Self::View { .. } => "E-RENDER-VIEW",
+            Self::NoScan => "E-RENDER-NO-SCAN",
+            Self::Elsewhere { .. } => "E-RENDER-ELSEWHERE",
             Self::TooLarge { .. } => "E-RENDER-SIZE",
             Self::Font(_) => "E-RENDER-FONT",
             Self::Pdf(_) => "E-RENDER-PDF",
@@ -78,7 +95,10 @@ impl Diagnose for Error {
     fn class(&self) -> Class {
         match self {
             Self::Param(error) => error.class(),
-            Self::Mismatch { .. } | Self::Number { .. } | Self::View { .. } => Class::Input,
+            Self::NoScan => Class::Usage,
+            Self::Mismatch { .. } | Self::Number { .. } | Self::View { .. } | Self::Elsewhere { .. } => {
+                Class::Input
+            }
             Self::TooLarge { .. } => Class::Limit,
             Self::Font(_) | Self::Pdf(_) | Self::Exr(_) => Class::Internal,
         }
@@ -89,6 +109,13 @@ impl Diagnose for Error {
             Self::Mismatch { .. } => "embed the same tree again and draw that".to_owned(),
             Self::Number { .. } => "check the unit and scale of the input".to_owned(),
             Self::View { .. } => "make views.json again with the views stage".to_owned(),
+            Self::NoScan => {
+                "name the scan with --image FILE (render.volume.image), or choose another style".to_owned()
+            }
+            Self::Elsewhere { .. } => {
+                "name the scan that the tree was made from with --image FILE; both must be in the same space"
+                    .to_owned()
+            }
             Self::TooLarge { .. } => "choose a smaller width_px".to_owned(),
             _ => String::new(),
         }

@@ -5,6 +5,8 @@ use espalier_model::{Branches, Embedding, Tree, View};
 use crate::furniture::Heading;
 use crate::orientation::Orientation;
 use crate::params::{Compass, Params};
+use crate::reformation::params::{Slab, VolumeParams};
+use crate::reformation::window::{Greys, signed};
 use crate::unit::{self, LengthUnit};
 
 /// The heading of the map.
@@ -37,6 +39,28 @@ pub(crate) fn planar(
         facts.push(format!("letters at the edges: where most of it points, off by {off} on average; at branches: where they point instead"));
     }
     Heading { title: params.title.clone(), verdict, facts }
+}
+
+/// The heading of a map that shows a scan: what is seen, and how, before what the tree is.
+pub(crate) fn with_scan(mut said: Heading, greys: &Greys, volume: &VolumeParams) -> Heading {
+    let [low, high] = greys.range.map(signed);
+    let mut facts = vec![
+        "the scan along the branches, a curved planar reformation".to_owned(),
+        format!("{} {low} to {high} {}", greys.name, if greys.unit == "HU" { "HU" } else { "" })
+            .trim_end()
+            .to_owned(),
+    ];
+    if volume.slab_mm > 0.0 {
+        let what = match volume.slab {
+            Slab::Mean => "mean",
+            Slab::Mip => "maximum",
+            Slab::Minip => "minimum",
+        };
+        facts.push(format!("{what} over a slab of {} mm", unit::text(volume.slab_mm, 3)));
+    }
+    facts.push("what lies off a branch may show twice, or not at all".to_owned());
+    facts.append(&mut said.facts);
+    Heading { facts, ..said }
 }
 
 /// Says first of all that the branches do not have their widths.

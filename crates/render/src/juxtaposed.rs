@@ -69,6 +69,7 @@ pub fn juxtaposed(
     params: &Params,
 ) -> Result<SideBySide, Error> {
     params.validate()?;
+    let params = &params.without_scan();
     let (n_entries, n_nodes) = (embedding.positions_mm.len(), found.shared.n_nodes());
     if n_entries != n_nodes {
         return Err(Error::Mismatch { what: "positions", n_entries, n_nodes });

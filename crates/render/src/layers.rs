@@ -14,12 +14,14 @@
 //! | `arc.mm` | the length of the path from the root, in space | mm |
 //! | `branch.id` | the branch, as in `nodes.tsv` and the SVG; −1 for background and for a tree of one node | |
 //! | `node.id` | the lower node of the edge, as in `nodes.tsv`; −1 for background | |
-//! | `position.X Y Z` | the point on the centreline in the patient, RAS+ | mm |
+//! | `position.X Y Z` | the point of the patient that the middle of the pixel stands for, RAS+: see [`PlanarMap`] | mm |
 //! | `loss.angle` | angle loss at the upper node of the edge | degrees |
 //! | `loss.length` | length loss of the edge, 0.01 = 1 % | |
 //! | `loss.orientation` | by how much the edge runs otherwise in space than the map's letters say | degrees |
 //!
-//! Everywhere that `A` is 0, ids are −1 and all else is 0. Channels have 32 bits where nothing else is said. Lengths are
+//! | `volume.value` | the scan there, for a picture that shows one; NaN where it has no value | its own |
+//!
+//! Everywhere that `A` is 0, ids are −1, `volume.value` is NaN and all else is 0. Channels have 32 bits where nothing else is said. Lengths are
 //! rounded to 1/256 of a pixel, so that the rest of their digits need no room.
 //! **Guarantees** the same bytes for any number of threads: blocks are compressed in parallel and written in order.
 //! **Source** OpenEXR 2 scan-line files. The blocks are packed here: the crate's own packing takes three times as long.
@@ -37,11 +39,13 @@ use exr::meta::attribute::{ChannelDescription, LineOrder, SampleType, Text};
 use exr::meta::header::{Header, LayerAttributes};
 use exr::prelude::f16;
 use flate2::{Compress, FlushCompress, Status};
+use glam::DVec2;
 
 use crate::Error;
 use crate::coloring::{angle_loss_deg, length_loss};
+use crate::map::PlanarMap;
 use crate::orientation::Orientation;
-use crate::page::Page;
+use crate::page::{Page, Paper};
 use crate::palette::linear_from_srgb;
 use crate::raster::Pixel;
 
@@ -53,41 +57,55 @@ const LEVEL: u32 = 1;
 /// Steps of a length, of a pixel.
 const STEPS_PER_PX: f64 = 256.0;
 
+/// A covered pixel with what is known of it beside.
+struct Seen<'a> {
+    pixel: &'a Pixel,
+    /// Its point in the patient, mm.
+    position_mm: [f32; 3],
+    /// The scan there; NaN where it has no value.
+    value: f32,
+}
+
 /// What a channel holds at a covered pixel.
-type Read = fn(&Layers<'_>, &Pixel) -> f32;
+type Read = fn(&Layers<'_>, &Seen<'_>) -> f32;
 
 const F16: SampleType = SampleType::F16;
 const F32: SampleType = SampleType::F32;
 
 /// The channels, in the alphabetic order in which OpenEXR stores them, with their background.
-const CHANNELS: [(&str, SampleType, f32, Read); 19] = [
-    ("A", F16, 0.0, |_, pixel| pixel.coverage),
-    ("B", F16, 0.0, |layers, pixel| layers.light(pixel, 2)),
-    ("G", F16, 0.0, |layers, pixel| layers.light(pixel, 1)),
-    ("R", F16, 0.0, |layers, pixel| layers.light(pixel, 0)),
-    ("across.mm", F32, 0.0, |layers, pixel| layers.drawn_mm(pixel.across_px)),
-    ("arc.mm", F32, 0.0, |layers, pixel| layers.along(pixel, |node| layers.arc_mm[node])),
-    ("branch.id", F32, -1.0, |layers, pixel| layers.branch(pixel)),
-    ("height.mm", F32, 0.0, |layers, pixel| layers.drawn_mm(pixel.height_px)),
-    ("loss.angle", F32, 0.0, |layers, pixel| layers.angle_loss_deg[pixel.node as usize]),
-    ("loss.length", F32, 0.0, |layers, pixel| layers.length_loss[pixel.node as usize]),
-    ("loss.orientation", F32, 0.0, |layers, pixel| layers.orientation_loss_deg[pixel.node as usize]),
-    ("node.id", F32, -1.0, |_, pixel| pixel.node as f32),
-    ("normal.X", F16, 0.0, |_, pixel| pixel.normal[0]),
-    ("normal.Y", F16, 0.0, |_, pixel| -pixel.normal[1]),
-    ("normal.Z", F16, 0.0, |_, pixel| pixel.normal[2]),
-    ("position.X", F32, 0.0, |layers, pixel| layers.along(pixel, |node| layers.tree.position_mm(node).x)),
-    ("position.Y", F32, 0.0, |layers, pixel| layers.along(pixel, |node| layers.tree.position_mm(node).y)),
-    ("position.Z", F32, 0.0, |layers, pixel| layers.along(pixel, |node| layers.tree.position_mm(node).z)),
-    ("radius.mm", F32, 0.0, |layers, pixel| layers.along(pixel, |node| layers.tree.nodes()[node].radius_mm)),
+const CHANNELS: [(&str, SampleType, f32, Read); 20] = [
+    ("A", F16, 0.0, |_, seen| seen.pixel.coverage),
+    ("B", F16, 0.0, |layers, seen| layers.light(seen.pixel, 2)),
+    ("G", F16, 0.0, |layers, seen| layers.light(seen.pixel, 1)),
+    ("R", F16, 0.0, |layers, seen| layers.light(seen.pixel, 0)),
+    ("across.mm", F32, 0.0, |layers, seen| layers.drawn_mm(seen.pixel.across_px)),
+    ("arc.mm", F32, 0.0, |layers, seen| layers.along(seen.pixel, |node| layers.arc_mm[node])),
+    ("branch.id", F32, -1.0, |layers, seen| layers.branch(seen.pixel)),
+    ("height.mm", F32, 0.0, |layers, seen| layers.drawn_mm(seen.pixel.height_px)),
+    ("loss.angle", F32, 0.0, |layers, seen| layers.angle_loss_deg[seen.pixel.node as usize]),
+    ("loss.length", F32, 0.0, |layers, seen| layers.length_loss[seen.pixel.node as usize]),
+    ("loss.orientation", F32, 0.0, |layers, seen| layers.orientation_loss_deg[seen.pixel.node as usize]),
+    ("node.id", F32, -1.0, |_, seen| seen.pixel.node as f32),
+    ("normal.X", F16, 0.0, |_, seen| seen.pixel.normal[0]),
+    ("normal.Y", F16, 0.0, |_, seen| -seen.pixel.normal[1]),
+    ("normal.Z", F16, 0.0, |_, seen| seen.pixel.normal[2]),
+    ("position.X", F32, 0.0, |_, seen| seen.position_mm[0]),
+    ("position.Y", F32, 0.0, |_, seen| seen.position_mm[1]),
+    ("position.Z", F32, 0.0, |_, seen| seen.position_mm[2]),
+    ("radius.mm", F32, 0.0, |layers, seen| layers.along(seen.pixel, |n| layers.tree.nodes()[n].radius_mm)),
+    // The last, and only where there is a scan. No number of it can be taken for background.
+    ("volume.value", F32, f32::NAN, |_, seen| seen.value),
 ];
 
 /// What the channels read.
 #[derive(Debug)]
 pub(crate) struct Layers<'a> {
     tree: &'a Tree,
-    page: &'a Page,
+    map: &'a PlanarMap<'a>,
+    sheet: Paper<'a>,
     turn_deg: u32,
+    /// Whether there is a scan to show.
+    has_values: bool,
     /// Steps of a length, per mm.
     steps_per_mm: f64,
     mm_per_step: f64,
@@ -105,9 +123,9 @@ impl<'a> Layers<'a> {
     /// Prepares the layers of a page.
     pub(crate) fn new(
         (tree, branches): (&'a Tree, &Branches),
-        embedding: &Embedding,
+        (map, embedding): (&'a PlanarMap<'a>, &Embedding),
         orientation: &Orientation,
-        (page, turn_deg): (&'a Page, u32),
+        (page, turn_deg, has_values): (&'a Page, u32, bool),
     ) -> Self {
         let mut arc_mm = vec![0.0; tree.n_nodes()];
         for (node, parent) in tree.edges() {
@@ -118,8 +136,10 @@ impl<'a> Layers<'a> {
         let steps = math::log2((STEPS_PER_PX * page.px_per_mm).clamp(f64::MIN_POSITIVE, 1e100));
         let mut layers = Self {
             tree,
-            page,
+            map,
+            sheet: Paper::new(page, turn_deg),
             turn_deg,
+            has_values,
             steps_per_mm: math::pow(2.0, math::ceil(steps)),
             mm_per_step: math::pow(2.0, -math::ceil(steps)),
             branch_of: nodes.clone().map(|n| branches.of_node(n).map_or(-1.0, |b| b as f32)).collect(),
@@ -130,32 +150,50 @@ impl<'a> Layers<'a> {
             light_of_byte: (0..=255_u8).map(|b| linear_from_srgb(f64::from(b) / 255.0) as f32).collect(),
             paper: Vec::new(),
         };
-        layers.paper = layers.pack(&vec![Pixel::EMPTY; BLOCK * page.width as usize]);
+        layers.paper = layers.pack(0, &vec![Pixel::EMPTY; BLOCK * page.width as usize], &[]);
         layers
     }
 
-    /// The packed blocks of a band of rows, whose first is a multiple of a block's.
-    pub(crate) fn blocks(&self, pixels: &[Pixel]) -> Vec<Vec<u8>> {
-        let n_whole = BLOCK * self.page.width as usize;
-        let packed = |block: &[Pixel]| {
+    /// The packed blocks of a band of rows, whose first is a multiple of a block's; with the scan at each pixel, if
+    /// there is one.
+    pub(crate) fn blocks(&self, first_row: usize, pixels: &[Pixel], values: &[f32]) -> Vec<Vec<u8>> {
+        let n_whole = BLOCK * self.sheet.page.width as usize;
+        let packed = |(i, block): (usize, &[Pixel])| {
             let is_paper = block.len() == n_whole && !block.iter().any(Pixel::is_covered);
-            if is_paper { self.paper.clone() } else { self.pack(block) }
+            let values = values.get(i * n_whole..).unwrap_or_default();
+            if is_paper { self.paper.clone() } else { self.pack(first_row + i * BLOCK, block, values) }
         };
-        pixels.chunks(n_whole).map(packed).collect()
+        pixels.chunks(n_whole).enumerate().map(packed).collect()
+    }
+
+    /// The channels of this picture.
+    fn channels(&self) -> &'static [(&'static str, SampleType, f32, Read)] {
+        if self.has_values { &CHANNELS } else { &CHANNELS[..CHANNELS.len() - 1] }
+    }
+
+    /// What is known of a pixel; nothing of background.
+    fn seen<'p>(&self, pixel: &'p Pixel, [column, row]: [usize; 2], value: f32) -> Option<Seen<'p>> {
+        if !pixel.is_covered() {
+            return None;
+        }
+        let at = self.sheet.plane_mm(DVec2::new(column as f64, row as f64) + 0.5);
+        let position = self.map.from_plane(pixel.node as usize, at).patient_mm;
+        Some(Seen { pixel, position_mm: position.to_array().map(|part| self.rounded(part)), value })
     }
 
     /// A block as OpenEXR stores it: line by line, in a line channel by channel; then the bytes of even places before
     /// those of odd ones, as differences, deflated. What does not get smaller is stored as it is.
-    fn pack(&self, block: &[Pixel]) -> Vec<u8> {
+    fn pack(&self, first_row: usize, block: &[Pixel], values: &[f32]) -> Vec<u8> {
         let mut halves = Halves::with_room(block.len());
-        let mut covered = Vec::new();
-        for line in block.chunks(self.page.width as usize) {
-            covered.clear();
-            covered.extend((0..line.len()).filter(|&x| line[x].is_covered()));
-            for &(_, sample_type, background, read) in &CHANNELS {
+        let width = self.sheet.page.size()[0];
+        for (row, line) in block.chunks(width).enumerate() {
+            let value = |column: usize| values.get(row * width + column).copied().unwrap_or(f32::NAN);
+            let seen = |(x, pixel)| Some((x, self.seen(pixel, [x, first_row + row], value(x))?));
+            let covered: Vec<(usize, Seen<'_>)> = line.iter().enumerate().filter_map(seen).collect();
+            for &(_, sample_type, background, read) in self.channels() {
                 let mut values = vec![background; line.len()];
-                for &x in &covered {
-                    values[x] = read(self, &line[x]);
+                for (x, seen) in &covered {
+                    values[*x] = read(self, seen);
                 }
                 halves.take(&values, sample_type);
             }
@@ -165,7 +203,7 @@ impl<'a> Layers<'a> {
 
     /// The file of all blocks, from the top.
     pub(crate) fn file(&self, blocks: Vec<Vec<u8>>) -> Result<Vec<u8>, Error> {
-        let channels = CHANNELS.iter().map(|&(name, sample_type, ..)| ChannelDescription {
+        let channels = self.channels().iter().map(|&(name, sample_type, ..)| ChannelDescription {
             name: Text::from(name),
             sample_type,
             quantize_linearly: true,
@@ -177,7 +215,8 @@ impl<'a> Layers<'a> {
             comments: Text::new_or_none(self.comment()),
             ..LayerAttributes::default()
         };
-        let size = Vec2(self.page.width as usize, self.page.height as usize);
+        let [width, height] = self.sheet.page.size();
+        let size = Vec2(width, height);
         let header = Header::new(Text::from(""), size, channels.collect())
             .with_encoding(Compression::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing)
             .with_attributes(attributes);
@@ -197,9 +236,9 @@ impl<'a> Layers<'a> {
 
     /// What a reader needs beside the channel names.
     fn comment(&self) -> String {
-        let Page { px_per_mm, origin_px, .. } = self.page;
+        let Page { px_per_mm, origin_px, .. } = self.sheet.page;
         format!(
-            "espalier-planar-exr 2; position in RAS+ mm; plane_x_mm = (x + 0.5 - {:.4}) * {:.9e}, \
+            "espalier-planar-exr 3; position in RAS+ mm; plane_x_mm = (x + 0.5 - {:.4}) * {:.9e}, \
              plane_y_mm = ({:.4} - y - 0.5) * {:.9e}; turned by {} degrees counter-clockwise; A = 0 is background; \
              losses: degrees, share",
             origin_px.x,
@@ -220,7 +259,7 @@ impl<'a> Layers<'a> {
 
     /// A length in the picture.
     fn drawn_mm(&self, length_px: f32) -> f32 {
-        self.rounded(f64::from(length_px) / self.page.px_per_mm)
+        self.rounded(f64::from(length_px) / self.sheet.page.px_per_mm)
     }
 
     /// A quantity of nodes at the pixel's place on its edge, mm.

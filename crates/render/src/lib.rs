@@ -9,8 +9,9 @@
 //! | 4 | `page` | scale and places |
 //! | 5 | `sketch`, `cone`, `kinship` | edges as round cones in pixels |
 //! | 6 | `raster`, `tiles`, `samples`, `shade` | the pixels |
-//! | 7 | `paint`, `svg`, `outline`, `layers` | the files |
-//! | 8 | `side_by_side`, `tiling`, `parts`; `juxtaposed`; `chart`, `convergence`, `profile` | several layouts in one figure; two trees on one map; charts of numbers |
+//! | 7 | `reformation` | the pixels of a scan along the map, in place of 5 and 6 |
+//! | 8 | `paint`, `svg`, `outline`, `layers` | the files |
+//! | 9 | `side_by_side`, `tiling`, `parts`; `juxtaposed`; `chart`, `convergence`, `profile` | several layouts in one figure; two trees on one map; charts of numbers |
 //!
 //! **Source** section 4.1 of [Hu2022].
 
@@ -43,6 +44,8 @@ mod samples;
 mod shade;
 mod tiles;
 
+mod reformation;
+
 mod layers;
 mod outline;
 mod paint;
@@ -60,7 +63,7 @@ mod tiling;
 
 mod error;
 
-use espalier_model::{Branches, Embedding, Report, Tree, ViewHierarchy};
+use espalier_model::{Branches, Embedding, Report, Tree, ViewHierarchy, Volume};
 use glam::DVec3;
 
 pub use chart::{Chart, Charts, charts};
@@ -74,12 +77,14 @@ use kinship::Kinship;
 use layers::Layers;
 pub use map::{Beside, Place, PlanarMap, reach};
 use orientation::Orientation;
-use page::{Needs, Page, Pen};
+use page::{Needs, Page, Paper, Pen};
 use paint::Canvas;
 use palette::PageColors;
 pub use params::{ColorBy, Compass, Fit, Params, Style, Theme, Unit};
 pub use profile::{Stretch, Way, profile};
 use raster::{Drawn, Job, Pixel, Raster};
+pub use reformation::params::{Slab, VolumeParams, Window};
+use reformation::{Reformation, Tally};
 use scene::Scene;
 pub use side_by_side::{Panel, Section, SideBySide, side_by_side};
 use text::Face;
@@ -111,33 +116,74 @@ pub struct Rendered {
 /// heading says so, and the report warns with `W-RENDER-THICK`.
 ///
 /// # Errors
-/// [`Error`] if a parameter is out of range, the embedding is another tree's, a number cannot be drawn, or the
-/// picture would be over 2²⁷ pixels.
+/// [`Error`] if a parameter is out of range, the embedding is another tree's, a number cannot be drawn, the picture would
+/// be over 2²⁷ pixels, or the style is that of a scan: see [`render_scan`].
 pub fn render(
     tree: &Tree,
     embedding: &Embedding,
     views: &ViewHierarchy,
     params: &Params,
 ) -> Result<Rendered, Error> {
+    draw_all((tree, embedding, views), None, params)
+}
+
+/// Draws an embedded tree with the scan along its branches, as [`Style::Volume`] has it; in any other style as
+/// [`render`]. The scan needs to hold no more than what [`VolumeParams::farthest_mm`] says around each node; its values
+/// are taken as they are, in HU where some are under −200.
+///
+/// The EXR has one more channel then, `volume.value`.
+///
+/// # Errors
+/// As [`render`], and where less than half of the tree lies in the scan.
+pub fn render_scan(
+    (tree, embedding, views): (&Tree, &Embedding, &ViewHierarchy),
+    scan: &Volume,
+    params: &Params,
+) -> Result<Rendered, Error> {
+    draw_all((tree, embedding, views), Some(scan), params)
+}
+
+fn draw_all(
+    (tree, embedding, views): (&Tree, &Embedding, &ViewHierarchy),
+    scan: Option<&Volume>,
+    params: &Params,
+) -> Result<Rendered, Error> {
     params.validate()?;
     check_entries(tree, embedding)?;
     let branches = tree.branches();
-    let scene = Scene::planar(tree, embedding, params.width_scale)?;
+    let scene = Scene::planar(tree, embedding, params.drawn_width_scale())?;
+    let map = PlanarMap::of(tree, embedding, views);
+    let reformation = match (params.style, scan) {
+        (Style::Volume, None) => return Err(Error::NoScan),
+        (Style::Volume, Some(scan)) => {
+            let rule = PageColors::of(params.theme).soft;
+            Some(Reformation::new((tree, &map), scan, (&params.volume, rule))?)
+        }
+        _ => None,
+    };
     // The losses do not depend on how the whole is turned.
     let orientation = Orientation::of(tree, &scene);
+    let own_params = params.without_scan();
+    let face = Face::built_in()?;
     let artist = Artist {
         tree,
         branches: &branches,
         coloring: &coloring::color((tree, &branches), embedding, &orientation, params),
-        params,
-        face: Face::built_in()?,
+        params: &own_params,
+        face: &face,
         colors: PageColors::of(params.theme),
     };
+    let greys = reformation.as_ref().map(|reformation| reformation.greys().coloring(tree.n_nodes()));
+    let on_map = Artist { coloring: greys.as_ref().unwrap_or(artist.coloring), params, ..artist.clone() };
 
     let said = heading::planar((tree, &branches), embedding, &orientation, params);
-    let scene = artist.turned(scene, &said)?;
+    let said = match &reformation {
+        Some(reformation) => heading::with_scan(said, reformation.greys(), &params.volume),
+        None => said,
+    };
+    let scene = on_map.turned(scene, &said)?;
     let axes = Orientation::of(tree, &scene).axes;
-    let map = artist.sheet(scene, said, Depth::Flat { axes })?;
+    let flat = on_map.sheet(scene, said, Depth::Flat { axes })?;
     let view = &views.global;
     let global = artist.sheet(
         Scene::seen(tree, view, params.width_scale)?,
@@ -145,35 +191,51 @@ pub fn render(
         Depth::Spatial { axes: [view.up.cross(view.towards_camera), view.up] },
     )?;
 
+    // Radii that nothing can be drawn with leave lines, and no room for a scan.
+    let reformation = reformation.filter(|_| flat.page.pen.style == Style::Volume);
     let layers = params.exr.then(|| {
-        Layers::new((tree, artist.branches), embedding, &orientation, (&map.page, map.scene.turn_deg))
+        let on_page = (&flat.page, flat.scene.turn_deg, reformation.is_some());
+        Layers::new((tree, artist.branches), (&map, embedding), &orientation, on_page)
     });
-    let drawing = artist.draw(&map, |_, pixels| {
-        let blocks = layers.as_ref().map(|layers| layers.blocks(pixels)).unwrap_or_default();
-        (pixels.iter().filter(|pixel| pixel.is_covered()).count(), blocks)
-    })?;
+    let blocks = |first_row: usize, pixels: &[Pixel], values: &[f32]| {
+        layers.as_ref().map(|layers| layers.blocks(first_row, pixels, values)).unwrap_or_default()
+    };
+    let n_covered = |pixels: &[Pixel]| pixels.iter().filter(|pixel| pixel.is_covered()).count();
+    let (drawing, tally) = match &reformation {
+        Some(reformation) => on_map.draw_scan(&flat, reformation, |first_row, band| {
+            (n_covered(&band.pixels), blocks(first_row, &band.pixels, &band.values))
+        })?,
+        None => {
+            let look = |first_row, pixels: &[Pixel]| (n_covered(pixels), blocks(first_row, pixels, &[]));
+            (on_map.draw(&flat, look)?, Tally::default())
+        }
+    };
     let n_covered = drawing.seen.iter().map(|(n_covered, _)| n_covered).sum();
     let blocks = drawing.seen.into_iter().flat_map(|(_, blocks)| blocks).collect();
     let title = params.title.as_deref().unwrap_or("planar map of a tree");
     let content = svg::Content {
         tree,
         branches: artist.branches,
-        scene: &map.scene,
-        coloring: artist.coloring,
+        scene: &flat.scene,
+        coloring: on_map.coloring,
         title,
         prefix: "",
     };
     let pdf = drawing.stream.map(|stream| {
-        let drawn = pdf::Drawn::of(&content, &map.page, &artist.colors, stream);
-        pdf::pdf(&map.page, (drawn, &map.groups), (artist.colors.background, &artist.face), title)
+        let drawn = pdf::Drawn::of(&content, &flat.page, &artist.colors, stream);
+        pdf::pdf(&flat.page, (drawn, &flat.groups), (artist.colors.background, artist.face), title)
     });
+    let mut report = report(tree, [&flat, &global], n_covered);
+    if let Some(reformation) = &reformation {
+        reformation.report(&tally, &mut report);
+    }
     Ok(Rendered {
         png: drawing.png,
-        svg: svg::svg(&content, &map.page, &map.groups, &artist.colors),
+        svg: svg::svg(&content, (&flat.page, &flat.groups), drawing.bare_png.as_deref(), &artist.colors),
         pdf: pdf.transpose()?,
         exr: layers.as_ref().map(|layers| layers.file(blocks)).transpose()?,
         global_view_png: artist.draw(&global, |_, _| ())?.png,
-        report: report(tree, [&map, &global], n_covered),
+        report,
     })
 }
 
@@ -215,19 +277,22 @@ struct Sheet {
 /// A picture, drawn.
 struct Drawing<T> {
     png: Vec<u8>,
-    /// The tree without the marks, packed, for a flat pseudo-surface in a PDF.
+    /// The tree without the marks, packed, for flat pixels in a PDF.
     stream: Option<Vec<u8>>,
+    /// The same as PNG, for a scan in an SVG.
+    bare_png: Option<Vec<u8>>,
     /// What was made of each band.
     seen: Vec<T>,
 }
 
 /// What the map and the global view have in common.
+#[derive(Clone)]
 struct Artist<'a> {
     tree: &'a Tree,
     branches: &'a Branches,
     coloring: &'a Coloring,
     params: &'a Params,
-    face: Face,
+    face: &'a Face,
     colors: PageColors,
 }
 
@@ -237,10 +302,21 @@ impl Artist<'_> {
         if self.params.fit == Fit::Upright {
             return Ok(scene);
         }
-        let (_, heading_px) = furniture::heading(&self.face, said, self.params.width_px, &self.colors);
+        let (_, heading_px) = furniture::heading(self.face, said, self.params.width_px, &self.colors);
         let pen = Pen { min_width_px: self.params.min_width_px, style: self.params.style };
         let needs = self.needs(heading_px, true, self.params.aspect);
-        Ok(scene.turned(Page::best_turn(&scene, (self.params.width_px, pen), &needs)?))
+        let room = self.room(&scene, pen.style);
+        Ok(scene.turned(Page::best_turn(&room, (self.params.width_px, pen), &needs)?))
+    }
+
+    /// What the tree takes of the page: a scan goes on beyond its walls.
+    fn room(&self, scene: &Scene, style: Style) -> Scene {
+        let volume = &self.params.volume;
+        if style == Style::Volume {
+            scene.reaching(|radius_mm| volume.reach(radius_mm))
+        } else {
+            scene.clone()
+        }
     }
 
     /// The room that marks need; `has_letters` at the edges.
@@ -248,7 +324,7 @@ impl Artist<'_> {
         let width = self.params.width_px;
         Needs {
             heading_px,
-            key_px: furniture::key_size(&self.face, self.coloring, width),
+            key_px: furniture::key_size(self.face, self.coloring, width),
             rim_px: Page::unit_px(width) * if has_letters { 4.2 } else { 2.2 },
             aspect,
         }
@@ -264,7 +340,7 @@ impl Artist<'_> {
     }
 
     fn sheet_as(&self, style: Style, scene: Scene, said: &Heading, depth: Depth) -> Result<Sheet, Error> {
-        let (page, groups) = self.lay_out(&scene, said, (style, depth))?;
+        let (page, groups) = self.lay_out(&self.room(&scene, style), said, (style, depth))?;
         let kinship = Kinship::new(self.tree, self.branches, &scene, page.px_per_mm);
         let sketched = |style| {
             let page = Page { pen: Pen { style, ..page.pen }, ..page };
@@ -328,11 +404,35 @@ impl Artist<'_> {
         });
         let mut canvas = Canvas::new([width, height], self.colors.background)?;
         let seen = canvas.surface(&raster, [0, 0], look);
-        let is_lit = pen.style == Style::PseudoSurface;
-        let stream =
-            (self.params.pdf && !sheet.has_depth).then(|| if is_lit { canvas.stream() } else { Vec::new() });
-        canvas.mark(&sheet.groups, &self.face);
-        Ok(Drawing { png: canvas.png(), stream, seen })
+        let is_pixels = pen.style.is_pixels();
+        let stream = (self.params.pdf && !sheet.has_depth)
+            .then(|| if is_pixels { canvas.stream() } else { Vec::new() });
+        canvas.mark(&sheet.groups, self.face);
+        Ok(Drawing { png: canvas.png(), stream, bare_png: None, seen })
+    }
+
+    /// The picture of a scan, and what `look` makes of each band of it, of which it is told the first row.
+    fn draw_scan<T: Send>(
+        &self,
+        sheet: &Sheet,
+        reformation: &Reformation<'_>,
+        look: impl Fn(usize, &reformation::Band) -> T + Sync,
+    ) -> Result<(Drawing<T>, Tally), Error> {
+        let paper = Paper::new(&sheet.page, sheet.scene.turn_deg);
+        let on_page = reformation.on(&paper);
+        let mut canvas = Canvas::new([sheet.page.width, sheet.page.height], self.colors.background)?;
+        let draw = |_: &mut (), index: usize| {
+            let (band, tally) = on_page.band(index);
+            let seen = look(index * raster::TILE, &band);
+            (band.pixels, (seen, tally))
+        };
+        let (seen, tallies): (Vec<T>, Vec<Tally>) =
+            canvas.bands((sheet.page.size(), [0, 0]), || (), draw).into_iter().unzip();
+        let stream = self.params.pdf.then(|| canvas.stream());
+        let bare_png = Some(canvas.png());
+        canvas.mark(&sheet.groups, self.face);
+        let tally = tallies.into_iter().fold(Tally::default(), Tally::and);
+        Ok((Drawing { png: canvas.png(), stream, bare_png, seen }, tally))
     }
 }
 

@@ -6,6 +6,7 @@
 //! right for it.
 //! **Cost** O(edges).
 
+use espalier_geom::math;
 use espalier_model::Tree;
 use glam::DVec2;
 
@@ -56,6 +57,33 @@ pub(crate) struct Page {
     pub key_at: DVec2,
     /// How wide branches are drawn.
     pub pen: Pen,
+}
+
+/// A page with a map on it: which point of the map's plane a pixel is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Paper<'a> {
+    /// The page.
+    pub page: &'a Page,
+    /// Where the plane's right lies on the page, y up: it may be turned as a whole.
+    right: DVec2,
+}
+
+impl<'a> Paper<'a> {
+    /// The page of a map that was turned by so many degrees counter-clockwise.
+    pub(crate) fn new(page: &'a Page, turn_deg: u32) -> Self {
+        Self { page, right: math::unit_vector(f64::from(turn_deg).to_radians()) }
+    }
+
+    /// The point of the plane at a place on the page, in pixels, mm.
+    pub(crate) fn plane_mm(&self, at_px: DVec2) -> DVec2 {
+        let away = (at_px - self.page.origin_px) / self.page.px_per_mm;
+        self.turned(DVec2::new(away.x, -away.y))
+    }
+
+    /// A direction on the page, y up, in the plane.
+    pub(crate) fn turned(&self, on_page: DVec2) -> DVec2 {
+        DVec2::new(self.right.x, -self.right.y).rotate(on_page)
+    }
 }
 
 /// How wide branches are drawn.
@@ -172,7 +200,7 @@ impl Page {
     pub(crate) fn radius_px(&self, radius_mm: f64) -> f64 {
         let least = 0.5 * self.pen.min_width_px;
         match self.pen.style {
-            Style::PseudoSurface | Style::Ribbon => (radius_mm * self.px_per_mm).max(least),
+            Style::PseudoSurface | Style::Ribbon | Style::Volume => (radius_mm * self.px_per_mm).max(least),
             Style::Line => least,
         }
     }

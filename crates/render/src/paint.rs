@@ -47,20 +47,34 @@ impl Canvas {
         [left, top]: [usize; 2],
         look: impl Fn(usize, &[Pixel]) -> T + Sync,
     ) -> Vec<T> {
-        let stride = 4 * self.pixmap.width() as usize;
-        let width = raster.size()[0];
-        let rows = self.pixmap.data_mut().get_mut(top * stride..).unwrap_or_default();
-        let bands = rows.par_chunks_mut(stride * TILE).take(raster.n_bands()).enumerate();
-        let draw = |brush: &mut Brush, (band, rows): (usize, &mut [u8])| {
+        let draw = |brush: &mut Brush, band: usize| {
             let pixels = raster.band(band, brush);
+            let seen = look(band * TILE, &pixels);
+            (pixels, seen)
+        };
+        self.bands((raster.size(), [left, top]), Brush::new, draw)
+    }
+
+    /// The same of whatever draws bands of [`TILE`] rows: of a picture of this size, at a pixel.
+    pub(crate) fn bands<B, T: Send>(
+        &mut self,
+        ([width, height], [left, top]): ([usize; 2], [usize; 2]),
+        brush: impl Fn() -> B + Sync + Send,
+        draw: impl Fn(&mut B, usize) -> (Vec<Pixel>, T) + Sync + Send,
+    ) -> Vec<T> {
+        let stride = 4 * self.pixmap.width() as usize;
+        let rows = self.pixmap.data_mut().get_mut(top * stride..).unwrap_or_default();
+        let bands = rows.par_chunks_mut(stride * TILE).take(height.div_ceil(TILE)).enumerate();
+        let paint = |brush: &mut B, (band, rows): (usize, &mut [u8])| {
+            let (pixels, seen) = draw(brush, band);
             for (line, row) in pixels.chunks(width).zip(rows.chunks_mut(stride)) {
                 for (pixel, target) in line.iter().zip(row.chunks_exact_mut(4).skip(left)) {
                     put(pixel, target);
                 }
             }
-            look(band * TILE, &pixels)
+            seen
         };
-        bands.map_init(Brush::new, draw).collect()
+        bands.map_init(brush, paint).collect()
     }
 
     /// Draws marks over everything.

@@ -67,6 +67,11 @@ impl Palette {
         Self::continuous(if theme == Theme::Dark { &LOSSES_ON_DARK } else { &LOSSES })
     }
 
+    /// Black to white, in even steps of lightness.
+    pub(crate) fn greys() -> Self {
+        Self::continuous(&[0x00_0000, 0xff_ffff])
+    }
+
     /// Less, no change, more.
     pub(crate) fn changes() -> Self {
         Self::continuous(&CHANGES)

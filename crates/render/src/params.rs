@@ -3,6 +3,8 @@
 use espalier_model::diagnose::ParamError;
 use serde::{Deserialize, Serialize};
 
+use crate::reformation::params::VolumeParams;
+
 /// How the branches are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -14,6 +16,16 @@ pub enum Style {
     Ribbon,
     /// The bare skeleton as lines of one width.
     Line,
+    /// The scan along the branches in greys, with their outline: a curved planar reformation of the whole tree. The
+    /// global view and the comparison of methods stay pseudo-surfaces.
+    Volume,
+}
+
+impl Style {
+    /// Whether it is a picture of pixels, which no paths can draw.
+    pub(crate) fn is_pixels(self) -> bool {
+        matches!(self, Self::PseudoSurface | Self::Volume)
+    }
 }
 
 /// The background and the ink.
@@ -108,7 +120,7 @@ pub struct Params {
     /// 1600: fills a screen, and prints 13.5 cm wide at 300 dpi. Larger shows finer branches and takes longer; under
     /// 480 only the tree, the verdict and the scale bar find room.
     pub width_px: u32,
-    /// How the branches are drawn. Default the pseudo-surface; where the radii, as in a wrong unit, would cover the
+    /// How the branches are drawn. Default the pseudo-surface; `"volume"` shows the scan along them; where the radii, as in a wrong unit, would cover the
     /// picture many times over, it gives way to lines, and heading and report say so.
     pub style: Style,
     /// Background and ink. Default light, for paper.
@@ -118,7 +130,8 @@ pub struct Params {
     /// The heading; none by default. Longer ones are broken into lines.
     pub title: Option<String>,
     /// Factor on every drawn radius, over 0 to 100. Default 1: true calibres. Larger makes thin trees easier to
-    /// see, and lets neighbours overlap sooner. Colours and the EXR's `radius` keep the true values.
+    /// see, and lets neighbours overlap sooner. Colours and the EXR's `radius` keep the true values. A scan on the map
+    /// has its true size whatever this says.
     pub width_scale: f64,
     /// The least width of a branch in pixels, 0.5 to 100; the width of every branch in the line style. Default 2:
     /// visible on screen and in print. Larger makes thin branches easier to see and hides their differences.
@@ -137,6 +150,8 @@ pub struct Params {
     pub pdf: bool,
     /// Whether to make the EXR with its layers. Default true; it is the largest of the files.
     pub exr: bool,
+    /// `[render.volume]`: the scan on the map, for `style = "volume"`.
+    pub volume: VolumeParams,
 }
 
 impl Default for Params {
@@ -155,6 +170,7 @@ impl Default for Params {
             aspect: None,
             pdf: true,
             exr: true,
+            volume: VolumeParams::default(),
         }
     }
 }
@@ -164,6 +180,17 @@ impl Params {
     #[must_use]
     pub fn paper() -> Self {
         Self { color_by: ColorBy::BranchRadius, ..Self::default() }
+    }
+
+    /// The factor on radii of the map: a scan has its true size.
+    pub(crate) fn drawn_width_scale(&self) -> f64 {
+        if self.style == Style::Volume { 1.0 } else { self.width_scale }
+    }
+
+    /// The same for pictures that have no scan to show: the pseudo-surface in its place.
+    pub(crate) fn without_scan(&self) -> Self {
+        let style = if self.style == Style::Volume { Style::PseudoSurface } else { self.style };
+        Self { style, ..self.clone() }
     }
 
     /// Checks every range.
@@ -192,6 +219,7 @@ impl Params {
             self.aspect.is_none_or(|aspect| (0.2..=5.0).contains(&aspect)),
             format!("must be 0.2 to 5, is {}", self.aspect.unwrap_or_default()),
         )?;
+        self.volume.validate()?;
         let title_chars = self.title.as_ref().map_or(0, |title| title.chars().count());
         ParamError::check(
             "title",

@@ -64,13 +64,13 @@ impl Drawn {
             svg::drawing_order(content).into_iter().map(|branch| Ribbon::of(content, page, &list[branch]))
         };
         let rim = shade::mix(colors.background, colors.rim, 0.75);
-        if content.branches.list().is_empty() && page.pen.style != Style::PseudoSurface {
+        if content.branches.list().is_empty() && !page.pen.style.is_pixels() {
             let center = page.px(content.scene.points_mm[0].truncate());
             let color = content.coloring.palette.at(content.coloring.ends[0][0]);
             return Self::Filled(vec![(disc(center, page.radius_px(content.scene.radii_mm[0])), color, rim)]);
         }
         match page.pen.style {
-            Style::PseudoSurface => Self::Pixels(stream),
+            Style::PseudoSurface | Style::Volume => Self::Pixels(stream),
             Style::Line => {
                 let line = |ribbon: Ribbon| (polyline(&ribbon.discs), ribbon.color);
                 Self::Lines(ribbons().map(line).collect(), page.pen.min_width_px)

@@ -156,11 +156,6 @@ impl<'a> Raster<'a> {
         self.job.size
     }
 
-    /// How many bands there are.
-    pub(crate) fn n_bands(&self) -> usize {
-        self.job.size[1].div_ceil(TILE)
-    }
-
     /// The pixels of the band of this index, [`TILE`] rows or what is left.
     pub(crate) fn band(&self, band: usize, brush: &mut Brush) -> Vec<Pixel> {
         let [width, height] = self.job.size;

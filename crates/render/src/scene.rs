@@ -67,6 +67,14 @@ impl Scene {
         Ok(Self { points_mm, radii_mm, turn_deg: 0 })
     }
 
+    /// The same with as much around each tube as `reach_mm` says for its radius.
+    pub(crate) fn reaching(&self, reach_mm: impl Fn(f64) -> f64) -> Self {
+        Self {
+            radii_mm: self.radii_mm.iter().map(|&radius| radius + reach_mm(radius)).collect(),
+            ..self.clone()
+        }
+    }
+
     /// The same centrelines without any width.
     pub(crate) fn without_radii(self) -> Self {
         Self { radii_mm: vec![0.0; self.radii_mm.len()], ..self }

@@ -48,7 +48,7 @@ pub(crate) fn shade(base: Rgb, place: &Place, colors: &PageColors, style: Style)
         // Lines are flat; a little of the rim keeps the palest colours off the paper.
         Style::Line => return mix(base, rim, 0.24 * colors.outline),
         Style::Ribbon => return mix(base, rim, outline),
-        Style::PseudoSurface => {}
+        Style::PseudoSurface | Style::Volume => {}
     }
     let n = place.normal;
     let lambert = ((n.dot(TO_LIGHT) + WRAP) / (1.0 + WRAP)).max(0.0);

@@ -96,6 +96,7 @@ pub struct SideBySide {
 /// be over 2²⁷ pixels.
 pub fn side_by_side(sections: &[Section<'_>], params: &Params) -> Result<SideBySide, Error> {
     params.validate()?;
+    let params = &params.without_scan();
     let artist = Artist { params, face: Face::built_in()?, colors: PageColors::of(params.theme) };
     let sheet = artist.lay_out(sections)?;
     let (width, height) = (params.width_px, sheet.height_px as u32);

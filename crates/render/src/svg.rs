@@ -4,11 +4,13 @@
 //! **Steps** 1. Each branch is one closed outline (see [`crate::outline`]). 2. A dark edge under all branches refers
 //! to the same paths, so that an edited branch takes its edge along. 3. Marks follow in named groups; text stays text.
 //! **Guarantees** coordinates in pixels with 2 decimals; titles and names are escaped; the picture is the same as
-//! the PNG but for the light.
+//! the PNG but for the light. A scan on the map is an image, and the branches over it have no colour.
 //! **Cost** O(nodes).
 
 use std::fmt::Write as _;
 
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
 use espalier_model::xml::escape;
 use espalier_model::{Branch, Branches, Tree};
 use glam::DVec2;
@@ -44,8 +46,13 @@ pub(crate) struct Content<'a> {
     pub prefix: &'a str,
 }
 
-/// Writes the document.
-pub(crate) fn svg(content: &Content<'_>, page: &Page, groups: &[Group], colors: &PageColors) -> String {
+/// Writes the document. `scan` is the whole page without its marks as PNG, for a page that shows a scan.
+pub(crate) fn svg(
+    content: &Content<'_>,
+    (page, groups): (&Page, &[Group]),
+    scan: Option<&[u8]>,
+    colors: &PageColors,
+) -> String {
     let (width, height) = (page.width, page.height);
     let mut out = String::new();
     // Writing to a String cannot fail, so the results of write! are dropped throughout.
@@ -66,6 +73,14 @@ pub(crate) fn svg(content: &Content<'_>, page: &Page, groups: &[Group], colors: 
         "<rect id=\"background\" width=\"{width}\" height=\"{height}\" fill=\"{}\"/>",
         hex(colors.background)
     );
+    if let Some(png) = scan {
+        let _ = writeln!(
+            out,
+            "<image id=\"scan\" width=\"{width}\" height=\"{height}\" \
+             xlink:href=\"data:image/png;base64,{}\"/>",
+            BASE64_STANDARD.encode(png)
+        );
+    }
     tree(&mut out, content, page, colors);
     write_groups(&mut out, groups);
     out.push_str("</svg>\n");
@@ -91,15 +106,16 @@ pub(crate) fn tree(out: &mut String, content: &Content<'_>, page: &Page, colors:
         let center = page.px(content.scene.points_mm[0].truncate());
         let radius = page.radius_px(content.scene.radii_mm[0]);
         let fill = hex(content.coloring.palette.at(content.coloring.ends[0][0]));
+        let opacity = if page.pen.style == Style::Volume { " fill-opacity=\"0\"" } else { "" };
         let _ = writeln!(
             out,
-            "<circle id=\"{prefix}root\" cx=\"{:.2}\" cy=\"{:.2}\" r=\"{radius:.2}\" fill=\"{fill}\"/>",
+            "<circle id=\"{prefix}root\" cx=\"{:.2}\" cy=\"{:.2}\" r=\"{radius:.2}\" fill=\"{fill}\"{opacity}/>",
             center.x, center.y
         );
         return;
     }
     let order = drawing_order(content);
-    if page.pen.style != Style::Line {
+    if !matches!(page.pen.style, Style::Line | Style::Volume) {
         let rim = hex(colors.rim);
         let _ = writeln!(
             out,
@@ -166,6 +182,8 @@ fn write_branch(
         Style::PseudoSurface | Style::Ribbon => {
             format!("d=\"{}Z\" fill=\"{fill}\"", svg_data(&outline(&discs)))
         }
+        // Under the pointer and the editor, but the scan is seen.
+        Style::Volume => format!("d=\"{}Z\" fill=\"#000\" fill-opacity=\"0\"", svg_data(&outline(&discs))),
         Style::Line => format!(
             "d=\"{}\" fill=\"none\" stroke=\"{fill}\" stroke-width=\"{:.2}\" stroke-linecap=\"round\" \
              stroke-linejoin=\"round\"",

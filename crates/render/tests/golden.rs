@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 use common::{fern, flat, front, node, tube};
 use espalier_model::{Node, Tree};
-use espalier_render::{ColorBy, Compass, Fit, Params, Style, Theme, render};
+use espalier_render::{ColorBy, Compass, Fit, Params, Style, Theme, render, render_scan};
 use image::{Rgb, RgbImage};
 
 /// The largest golden, in bytes.
@@ -130,6 +130,45 @@ fn junction_bend_and_taper() {
 fn styles() {
     check_map("style-ribbon", &fork(), &Params { style: Style::Ribbon, ..tiny() });
     check_map("style-line", &fork(), &Params { style: Style::Line, ..tiny() });
+}
+
+#[test]
+fn a_scan_on_the_map() {
+    // Dark inside, walls of 1.5 mm, a bead on the wall of the thick branch, and a gradient around; cut at the right.
+    let tree = fork();
+    let value = |at: glam::DVec3| {
+        let distance = |(node, parent): (usize, usize)| {
+            let (a, b) = (tree.position_mm(parent), tree.position_mm(node));
+            let share = espalier_geom::space::nearest_parameter(at, a, b);
+            let radius = |node: usize| tree.nodes()[node].radius_mm;
+            at.distance(a.lerp(b, share)) - (radius(parent) + share * (radius(node) - radius(parent)))
+        };
+        let outside = tree.edges().map(distance).fold(f64::INFINITY, f64::min);
+        let is_bead = at.distance(glam::DVec3::new(-6.5, 0.0, -16.5)) < 1.6;
+        match outside {
+            _ if is_bead => 400.0,
+            o if o < 0.0 => -950.0,
+            o if o < 1.5 => 50.0,
+            _ => -850.0 + 15.0 * (at.z + 20.0),
+        }
+    };
+    let shape = [66_usize, 20, 90];
+    let grid = espalier_model::Grid::axis_aligned(
+        shape,
+        glam::DVec3::splat(0.6),
+        glam::DVec3::new(-20.0, -6.0, -44.0),
+    )
+    .expect("a grid");
+    let at = |[x, y, z]: [usize; 3]| {
+        grid.world_from_voxel().transform_point3(glam::DVec3::new(x as f64, y as f64, z as f64))
+    };
+    let values = ndarray::Array3::from_shape_fn((shape[2], shape[1], shape[0]), |(z, y, x)| {
+        value(at([x, y, z])) as f32
+    });
+    let scan = espalier_model::Volume::new(grid.clone(), espalier_model::Voxels::F32(values), 1.0, 0.0);
+    let params = Params { style: Style::Volume, width_px: 320, ..tiny() };
+    let made = render_scan((&tree, &flat(&tree), &front(&tree)), &scan, &params).expect("pictures");
+    check("style-volume", &made.png);
 }
 
 #[test]

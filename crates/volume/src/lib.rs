@@ -11,6 +11,7 @@
 //! | stored numbers of any type and byte order | `decode` |
 //! | what stands between voxels; sheared axes to orthogonal ones | `interpolate`, `orthogonal` |
 //! | **[`read`]**: file → [`Volume`](espalier_model::Volume) | `read` |
+//! | the part of a volume in a box of the world, for who needs no more | `crop` |
 //! | what a volume is: mask, labels, CT | `kind` |
 //! | mask, label, threshold band | `select`, `choose` |
 //! | labels by name | `labels`, `labels/classes` |
@@ -46,6 +47,7 @@ mod metaimage;
 mod nifti;
 mod nrrd;
 
+mod crop;
 mod decode;
 mod interpolate;
 mod orthogonal;
@@ -79,6 +81,7 @@ mod params;
 mod read_error;
 mod spacing;
 
+pub use crop::{Cropped, read_box};
 pub use dicom::{DicomError, Irregularity, Listed, Obstacle, is_dicom_folder};
 pub use error::Error;
 pub use euler::euler_number;

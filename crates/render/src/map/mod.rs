@@ -99,7 +99,13 @@ impl<'a> PlanarMap<'a> {
     /// The edge, by its lower node, to which a point of the plane belongs.
     #[must_use]
     pub fn owner_in_plane(&self, plane_mm: DVec2) -> usize {
-        self.owner(|node| {
+        self.owner_among(1..self.tree.n_nodes(), plane_mm).unwrap_or(0)
+    }
+
+    /// The same of these edges alone, by their lower nodes in preorder; none of none.
+    #[must_use]
+    pub fn owner_among(&self, edges: impl Iterator<Item = usize>, plane_mm: DVec2) -> Option<usize> {
+        Self::owner(edges, |node| {
             let place = self.foot_in_plane(node, plane_mm);
             self.reach(plane_mm.distance(self.plane_at(place)), place)
         })
@@ -108,10 +114,11 @@ impl<'a> PlanarMap<'a> {
     /// The edge, by its lower node, to which a point of the patient belongs.
     #[must_use]
     pub fn owner_in_patient(&self, patient_mm: DVec3) -> usize {
-        self.owner(|node| {
+        let reach = |node: usize| {
             let place = self.foot_in_patient(node, patient_mm);
             self.reach(patient_mm.distance(self.patient_at(place)), place)
-        })
+        };
+        Self::owner(1..self.tree.n_nodes(), reach).unwrap_or(0)
     }
 
     /// The centreline in the plane, mm.
@@ -133,6 +140,13 @@ impl<'a> PlanarMap<'a> {
     pub fn frame_at(&self, place: Place) -> DQuat {
         let (from, to) = self.ends(place.node);
         frames::between(self.frames[from], self.frames[to], place.share)
+    }
+
+    /// The direction in the plane of the edge above a node, a unit vector; to the right where the edge has no length.
+    #[must_use]
+    pub fn direction(&self, node: usize) -> DVec2 {
+        let (from, to) = self.ends(node);
+        (self.positions_mm[to] - self.positions_mm[from]).normalize_or(DVec2::X)
     }
 
     /// The radius of the organ, mm.
@@ -164,11 +178,11 @@ impl<'a> PlanarMap<'a> {
     }
 
     /// The edge with the least `reach`; of equal ones the first.
-    fn owner(&self, reach: impl Fn(usize) -> f64) -> usize {
-        (1..self.tree.n_nodes())
+    fn owner(edges: impl Iterator<Item = usize>, reach: impl Fn(usize) -> f64) -> Option<usize> {
+        edges
             .map(|node| (node, reach(node)))
             .reduce(|best, other| if other.1 < best.1 { other } else { best })
-            .map_or(0, |(node, _)| node)
+            .map(|(node, _)| node)
     }
 }
 
