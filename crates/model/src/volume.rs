@@ -96,6 +96,26 @@ impl Volume {
         with_array!(&self.voxels, a => a.iter().for_each(|&v| visit(self.slope * v as f64 + self.intercept)));
     }
 
+    /// Calls `visit` with each piece of the scaled values in storage order: the flat index of its first voxel, and some
+    /// values that follow each other.
+    pub fn for_each_piece(&self, mut visit: impl FnMut(usize, &[f64])) {
+        /// Values of a piece.
+        const N_AT_A_TIME: usize = 8192;
+        let mut piece = Vec::with_capacity(N_AT_A_TIME.min(self.grid.n_voxels()));
+        let mut start = 0;
+        self.for_each_value(|value| {
+            piece.push(value);
+            if piece.len() == N_AT_A_TIME {
+                visit(start, &piece);
+                start += piece.len();
+                piece.clear();
+            }
+        });
+        if !piece.is_empty() {
+            visit(start, &piece);
+        }
+    }
+
     /// The scaled values as a flat vector in storage order (x fastest), mapped by `map`.
     #[must_use]
     pub fn map_values<T>(&self, mut map: impl FnMut(f64) -> T) -> Vec<T> {

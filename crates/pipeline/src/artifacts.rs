@@ -9,11 +9,11 @@ use std::sync::Arc;
 use espalier_model::swc::{self, Traced};
 use espalier_model::{
     Comparison, Diagnose, Edits, Embedding, InscribedSpheres, Ledger, Mask, Report, Skeleton, Tree,
-    ViewHierarchy, Volume, view_axes_from_json,
+    ViewHierarchy, view_axes_from_json,
 };
 use espalier_model::{label_table, polydata};
 use espalier_tree::LabelMap;
-use espalier_volume::Orientation;
+use espalier_volume::{Orientation, Pieces};
 use glam::DVec3;
 
 use crate::config::{Input, Source, Unit};
@@ -107,10 +107,11 @@ impl Artifacts {
         label_table::parse_names(&self.read_text(path)?).map_err(|error| Error::file(path, error))
     }
 
-    /// The scan itself, as it was read for the mask.
-    pub(crate) fn scan(&mut self, lookup: Lookup<'_>) -> Result<Volume, Error> {
+    /// The values of the scan, as they were read for the mask.
+    pub(crate) fn scan(&mut self, lookup: Lookup<'_>) -> Result<Pieces, Error> {
         let path = self.locate(Artifact::Volume, lookup)?;
-        self.read_volume(&path, lookup.stage).map(|loaded| loaded.volume)
+        espalier_volume::open_pieces(&path, &self.read_options)
+            .map_err(|error| Error::stage(lookup.stage)(Box::new(error)))
     }
 
     /// What the scan has between two corners of the world, RAS+ mm: of the file that the config names for the map, else

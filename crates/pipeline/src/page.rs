@@ -7,7 +7,7 @@
 
 use espalier_model::{Embedding, Ledger, Mask, Report, Tree};
 use espalier_render::{ColorBy, ColorTable, Theme, color_table};
-use espalier_report::{Coloring, Facts, InputFile, InputKind, Rows, Setting, Slices, StageFacts};
+use espalier_report::{Coloring, Facts, InputFile, InputKind, Mosaic, Rows, Setting, Slices, StageFacts};
 use serde::Deserialize;
 
 use crate::artifacts::Artifacts;
@@ -97,9 +97,10 @@ pub(crate) fn slices(
     if !is_scan {
         return Ok(Vec::new());
     }
-    let volume = step.take(Artifacts::scan)?;
-    let drawn = espalier_report::slices(&volume, mask).map_err(|error| step.failed(error))?;
-    let Some(drawn) = drawn else { return Ok(Vec::new()) };
+    let scan = step.take(Artifacts::scan)?;
+    let Some(mut mosaic) = Mosaic::new(scan.grid(), mask) else { return Ok(Vec::new()) };
+    scan.for_each(|start, values| mosaic.see(start, values)).map_err(|error| step.failed(error))?;
+    let drawn = mosaic.draw().map_err(|error| step.failed(error))?;
     let values = drawn.range.into_iter().chain(drawn.window);
     INTENSITIES.into_iter().zip(values).for_each(|(name, value)| report.count(name, value));
     let files = Slices::names().into_iter().zip(drawn.png);

@@ -51,7 +51,7 @@ use maud::{Markup, html};
 pub use facts::{Coloring, Facts, InputFile, InputKind, Setting, StageFacts};
 pub use params::Params;
 pub use rows::Rows;
-pub use slices::{Slices, slices};
+pub use slices::{Mosaic, Slices};
 
 use page::{Page, Section};
 

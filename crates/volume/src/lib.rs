@@ -25,6 +25,7 @@
 //! | tunnels counted, and closed where they are faults | `euler`, `heal` |
 //! | **[`segment`]**: `Volume` → [`Mask`](espalier_model::Mask) | `segment` |
 //! | **[`read_mask`]**: file → `Mask`, without holding the volume where values alone decide | `read_mask`, `stream` |
+//! | **[`open_pieces`]**: file → values, without holding the volume | `pieces` |
 //!
 //! **Spaces** World is RAS+ mm. A voxel is (x, y, z), x fastest: of a volume on the file's own axes, of a mask on those
 //! of [`Orientation`].
@@ -72,6 +73,7 @@ mod flood;
 mod heal;
 mod segment;
 
+mod pieces;
 mod read_mask;
 mod stream;
 
@@ -90,6 +92,7 @@ pub use kind::{Kind, check_regions, inspect_kind};
 pub use labels::{Label, Labels};
 pub use options::{AssumedSpace, ReadOptions};
 pub use params::{Components, Method, Orientation, Params, Preset};
+pub use pieces::{Pieces, open_pieces};
 pub use read::{Loaded, files, read};
 pub use read_error::ReadError;
 pub use read_mask::read_mask;

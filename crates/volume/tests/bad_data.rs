@@ -3,9 +3,11 @@
 
 mod common;
 
+use std::path::Path;
+
 use common::{data, outcome};
 use espalier_geom::random::{Purpose, Stream};
-use espalier_volume::{Error, Params, ReadError, ReadOptions, read, read_mask};
+use espalier_volume::{Error, Params, ReadError, ReadOptions, open_pieces, read, read_mask};
 
 /// Enough for every legal file of the data, too little for the bombs.
 const OPTIONS: ReadOptions = ReadOptions {
@@ -145,7 +147,11 @@ fn mutants_never_panic() {
             let mutant = mutate(&original, &mut stream);
             std::fs::write(&path, &mutant).expect("writable");
             let streamed = read_mask(&path, &options, &Params::default());
-            match read(&path, &options) {
+            let whole = read(&path, &options);
+            let pieces = values_by_piece(&path, &options).map_err(|error| error.to_string());
+            let values = whole.as_ref().map(|loaded| loaded.volume.map_values(f64::to_bits));
+            assert_eq!(pieces, values.map_err(Error::to_string), "by piece and at once");
+            match whole {
                 Ok(loaded) => {
                     n_read += 1;
                     assert!(!matches!(streamed, Err(Error::Read { .. })), "read whole, but not as a mask");
@@ -163,6 +169,20 @@ fn mutants_never_panic() {
         n_read > 100 && n_refused > 100,
         "{n_read} read, {n_refused} refused: too one-sided to test much"
     );
+}
+
+/// The values of a volume by piece, each in its place; as bits, so that one that is not a number equals itself. What is
+/// larger than the limit is read all the same, as nothing of it is held.
+fn values_by_piece(path: &Path, options: &ReadOptions) -> Result<Vec<u64>, Error> {
+    let pieces = open_pieces(path, options)?;
+    let n_voxels = pieces.grid().n_voxels();
+    let mut values = Vec::new();
+    pieces.for_each(|start, piece| {
+        assert_eq!(start, values.len(), "in order");
+        values.extend(piece.iter().map(|value| value.to_bits()));
+    })?;
+    assert_eq!(values.len(), n_voxels, "all of them");
+    Ok(values)
 }
 
 /// Up to four changes: bytes set at random (mostly in the header) or to extremes, a piece cut out, the end cut.

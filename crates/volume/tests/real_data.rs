@@ -6,8 +6,8 @@ mod common;
 use common::data;
 use espalier_model::{Diagnose, LedgerKind, Mask};
 use espalier_volume::{
-    Components, Error, Kind, Labels, Method, Params, Preset, ReadOptions, Segmented, inspect_kind, read,
-    read_mask, segment,
+    Components, Error, Kind, Labels, Method, Params, Preset, ReadOptions, Segmented, inspect_kind,
+    open_pieces, read, read_mask, segment,
 };
 
 fn load(name: &str) -> Option<espalier_volume::Loaded> {
@@ -242,5 +242,26 @@ fn streamed_masks_equal_those_of_whole_volumes() {
             Segmented { report, ..whole }
         });
         assert_eq!(streamed, whole, "{name}");
+    }
+}
+
+/// Piece by piece a volume has the values that it has at once, whatever its format.
+#[test]
+fn pieces_are_those_of_whole_volumes() {
+    let Some(data) = data() else { return };
+    let names = ["ct_avm_head_cta.nii.gz", "vmtk_aorta.mha", "cip_ct64.nrrd", "cip_ct64_dicom_series"];
+    for name in names {
+        let path = data.join("volumes").join(name);
+        let whole = read(&path, &ReadOptions::default()).expect("readable").volume;
+        let pieces = open_pieces(&path, &ReadOptions::default()).expect("readable");
+        assert_eq!(pieces.grid(), whole.grid(), "{name}");
+        let mut values = Vec::new();
+        pieces
+            .for_each(|start, piece| {
+                assert_eq!(start, values.len());
+                values.extend_from_slice(piece);
+            })
+            .expect("readable");
+        assert!(values == whole.map_values(|value| value), "{name}");
     }
 }
