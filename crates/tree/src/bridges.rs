@@ -54,14 +54,14 @@ struct Nearest {
     sample: Sample,
 }
 
-/// Joins the islands that can be to the component `tree`; returns those that were.
+/// Joins the islands that can be to the component `tree`; returns those that were, each with its gap in mm.
 pub(crate) fn join(
     graph: &mut Graph,
     component_of: &[usize],
     tree: usize,
     islands: &[Island],
     ledger: &mut Ledger,
-) -> Vec<usize> {
+) -> Vec<(usize, f64)> {
     let places = places_by_component(graph, component_of);
     let mut nearest: Vec<Option<Nearest>> = vec![None; graph.hubs.len()];
     let mut left: Vec<(Island, Vec<usize>)> =
@@ -82,14 +82,14 @@ pub(crate) fn join(
                 }
             }
         }
-        let Some((_, i, hub)) = best else { break };
+        let Some((gap_mm, i, hub)) = best else { break };
         let (island, _) = left.swap_remove(i);
         if let Some(nearest) = nearest[hub] {
             ledger.0.push(entry(&island, graph.hubs[hub].sample, &nearest));
             bridges.push(Bridge { place: nearest.place, hub });
         }
         newest = island.component;
-        joined.push(newest);
+        joined.push((newest, gap_mm));
     }
     build(graph, &bridges);
     joined
@@ -133,14 +133,18 @@ fn look(nearest: &mut Option<Nearest>, from: Sample, places: &[(Place, Sample)])
 
 fn entry(island: &Island, from: Sample, nearest: &Nearest) -> LedgerEntry {
     let to = nearest.sample;
+    let allowed = match island.max_gap_mm {
+        f64::INFINITY => "any was allowed".to_owned(),
+        max_gap_mm => format!("up to {max_gap_mm:.3} mm were allowed"),
+    };
     LedgerEntry {
         kind: LedgerKind::GapBridged,
         position_mm: from.position_mm.midpoint(to.position_mm),
         radius_mm: 0.5 * (from.radius_mm + to.radius_mm),
         length_mm: from.position_mm.distance(to.position_mm),
         reason: format!(
-            "island of {:.3} mm joined over a gap of {:.3} mm between surfaces; up to {:.3} mm were allowed",
-            island.length_mm, nearest.gap_mm, island.max_gap_mm
+            "island of {:.3} mm joined over a gap of {:.3} mm between surfaces; {allowed}",
+            island.length_mm, nearest.gap_mm
         ),
     }
 }

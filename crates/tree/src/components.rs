@@ -3,19 +3,23 @@
 //! **Input** [`Graph`]. **Output** the graph of its longest component and of those joined to it; a ledger entry for each
 //! bridge, and for each component dropped, at its thickest hub.
 //! **Policies** `join`: over gaps of at most `bridge_mm` and of the island's own length, since a bridge longer than what it
-//! leads to explains nothing; `all`: over any gap; `largest`: none; `refuse`: an error if there are several. An
+//! leads to explains nothing; over any gap if the island has [`TREE_SHARE`] of the longest's length, since no gap is as bad
+//! as half of a forest lost; `all`: over any gap; `largest`: none; `refuse`: an error if there are several. An
 //! island that is no longer than a spur at its own radius is never joined: it is noise, and would be pruned.
 //! **Why length**, not voxels or volume? Voxel counts depend on the direction of thick slices, and a volume would
 //! prefer one blob to a whole vessel tree. Ties: the component with the lower hub index.
 //! **Cost** O(N α(N)), and what [`bridges`] takes.
 
 use espalier_geom::union_find::UnionFind;
-use espalier_model::{Ledger, LedgerEntry, LedgerKind};
+use espalier_model::{Ledger, LedgerEntry, LedgerKind, Report};
 
 use crate::Error;
 use crate::bridges::{self, Island};
 use crate::graph::{Graph, Hub, Piece};
 use crate::params::{Components, Params};
+
+/// An island of at least this share of the longest component's length is a tree of its own.
+pub(crate) const TREE_SHARE: f64 = 0.1;
 
 struct Component {
     length_mm: f64,
@@ -27,7 +31,12 @@ struct Component {
 ///
 /// # Errors
 /// [`Error::Components`] if there are several and the policy is to refuse them.
-pub(crate) fn select(mut graph: Graph, params: &Params, ledger: &mut Ledger) -> Result<Graph, Error> {
+pub(crate) fn select(
+    mut graph: Graph,
+    params: &Params,
+    ledger: &mut Ledger,
+    report: &mut Report,
+) -> Result<Graph, Error> {
     let mut sets = UnionFind::new(graph.hubs.len());
     for piece in &graph.pieces {
         sets.join(piece.ends[0], piece.ends[1]);
@@ -50,13 +59,16 @@ pub(crate) fn select(mut graph: Graph, params: &Params, ledger: &mut Ledger) -> 
 
     let islands: Vec<Island> = by_length[1..]
         .iter()
-        .filter_map(|&hub| joinable(hub, components[hub].as_ref()?, params))
+        .filter_map(|&hub| joinable(hub, components[hub].as_ref()?, length(&kept), params))
         .take(bridges::MAX_ISLANDS)
         .collect();
     let joined = bridges::join(&mut graph, &component_of, kept, &islands, ledger);
     let mut is_kept = vec![false; component_of.len()];
-    for component in joined.into_iter().chain([kept]) {
+    for component in joined.iter().map(|&(component, _)| component).chain([kept]) {
         is_kept[component] = true;
+    }
+    if params.components == Components::Join {
+        warn_of_long_bridges(&joined, params, report);
     }
     for (hub, component) in by_length.iter().filter_map(|&hub| Some((hub, components[hub].as_ref()?))) {
         if !is_kept[hub] {
@@ -69,15 +81,31 @@ pub(crate) fn select(mut graph: Graph, params: &Params, ledger: &mut Ledger) -> 
 }
 
 /// The island that a component is, if the policy may join it.
-fn joinable(component: usize, measured: &Component, params: &Params) -> Option<Island> {
+fn joinable(component: usize, measured: &Component, longest_mm: f64, params: &Params) -> Option<Island> {
     let length_mm = measured.length_mm;
     let max_gap_mm = match params.components {
+        Components::Join if length_mm >= TREE_SHARE * longest_mm => f64::INFINITY,
         Components::Join => params.bridge_mm.min(length_mm),
         Components::All => f64::INFINITY,
         Components::Largest | Components::Refuse => return None,
     };
     let spur_mm = (params.prune_factor * measured.thickest.sample.radius_mm).max(params.prune_min_mm);
     (length_mm > spur_mm).then_some(Island { component, length_mm, max_gap_mm })
+}
+
+/// An edge over a wide gap is in the picture for the sake of what lies beyond it.
+fn warn_of_long_bridges(joined: &[(usize, f64)], params: &Params, report: &mut Report) {
+    let long_mm = || joined.iter().map(|&(_, gap_mm)| gap_mm).filter(|&gap_mm| gap_mm > params.bridge_mm);
+    if long_mm().next().is_some() {
+        let (n_long, longest_mm) = (long_mm().count(), long_mm().fold(0.0, f64::max));
+        report.warn(
+            "W-TREE-FOREST",
+            format!(
+                "the mask is a forest: {n_long} more trees are joined to the longest over gaps of up to {longest_mm:.1} mm, where \
+                 there is no vessel: topology.tsv has the places; set tree.components = \"largest\" for one tree alone"
+            ),
+        );
+    }
 }
 
 fn dropped(component: &Component, kept_mm: f64) -> LedgerEntry {

@@ -105,7 +105,7 @@ pub fn build(
 
     // Topology: one component, no loops, no spurs, a root.
     let voxel_graph = graph::of_voxels(&adjacency::Adjacency::of(skeleton), spheres);
-    let mut graph = components::select(voxel_graph, params, &mut ledger)?;
+    let mut graph = components::select(voxel_graph, params, &mut ledger, &mut report)?;
     loops::open(&mut graph, params, &mut ledger)?;
     let mut living = living::Living::new(&graph);
     let protection = root::protected_tips(&mut living, params);

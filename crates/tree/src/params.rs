@@ -5,12 +5,12 @@ use serde::{Deserialize, Serialize};
 
 /// What to do with a skeleton in several pieces. Short gaps are mostly stretches that the segmentation lost, and a
 /// reader expects the vessel to go on; distant pieces are other vessels or noise, and an edge to them would be a vessel
-/// that is not there.
+/// that is not there. But a tree of its own, such as the vessels of the other lung, belongs in the picture, edge or no.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Components {
-    /// Keep the longest, join to it what lies within `bridge_mm`, drop the others; each bridge and each drop is in the
-    /// ledger.
+    /// Keep the longest, join to it what lies within `bridge_mm`, and over any gap what is a tree of its own, drop the
+    /// others; each bridge and each drop is in the ledger, and a warning tells of the long bridges.
     #[default]
     Join,
     /// Keep the longest, drop the others; each drop is in the ledger.
@@ -103,8 +103,9 @@ pub struct Params {
     /// What to do with a skeleton in several pieces. Default `join`. It matters only if `volume.components` left several.
     pub components: Components,
     /// With `components = "join"`: the widest gap that is bridged, from surface to surface, in mm; 0 to 1000. Default 3,
-    /// about the width of the lung's subsegmental vessels; a gap wider than the island is long is never bridged. Larger
-    /// joins more, and more that does not belong together.
+    /// about the width of the lung's subsegmental vessels; a gap wider than the island is long is never bridged, but for
+    /// one of at least a tenth of the longest's length, which is joined over any. Larger joins more, and more that does
+    /// not belong together.
     pub bridge_mm: f64,
     /// What to do with loops. Default `cut`: real masks are never trees.
     pub loops: Loops,

@@ -1,6 +1,6 @@
-//! The largest components of a mask.
+//! The components of a mask that stay, mostly the largest.
 //!
-//! **Input** a mask and its runs; how many components stay, and from which volume on. **Output** the same without
+//! **Input** a mask and its runs; how many components stay, and from which volume or share of the largest on. **Output** the same without
 //! the others, and a ledger entry for each that went.
 //! **Steps** 1. label the 26-connected components; 2. rank them by size, of equal ones the first in storage order;
 //! 3. clear all beyond the limits.
@@ -9,7 +9,7 @@
 use espalier_model::{Bits, Grid, Ledger, LedgerEntry, LedgerKind, Report};
 use glam::DVec3;
 
-use crate::Params;
+use crate::params::{Components as Policy, MAIN_SHARE, Params};
 use crate::runs::{Components, Connectivity, Runs};
 
 /// How many dropped components the ledger lists one by one; a noisy threshold drops thousands.
@@ -49,7 +49,13 @@ pub(crate) fn keep(
     ranked.sort_by_key(|&component| std::cmp::Reverse(components[component].n_voxels));
     let millilitres =
         |component: usize| components[component].n_voxels as f64 * grid.voxel_volume_mm3() / 1e3;
-    let n_large = ranked.partition_point(|&component| millilitres(component) >= params.min_component_ml);
+    let largest = ranked.first().map_or(0, |&component| components[component].n_voxels);
+    let share = if params.components == Policy::Main { MAIN_SHARE } else { 0.0 };
+    let is_large = |component: usize| {
+        let n_voxels = components[component].n_voxels as f64;
+        millilitres(component) >= params.min_component_ml && n_voxels >= share * largest as f64
+    };
+    let n_large = ranked.partition_point(|&component| is_large(component));
     let n_kept = n_large.min(params.components.limit());
     let (_, dropped) = ranked.split_at(n_kept);
     clear(bits, runs, &labelled, dropped);
@@ -59,7 +65,7 @@ pub(crate) fn keep(
     report.count_usize("components", components.len());
     report.count_usize("components_dropped", dropped.len());
     report.count_usize("components_dropped_voxels", n_dropped_voxels);
-    report.count_usize("component_largest_voxels", size(ranked.first()));
+    report.count_usize("component_largest_voxels", largest);
     report.count_usize("component_dropped_largest_voxels", size(dropped.first()));
     let entries: Vec<Component> = dropped.iter().map(|&component| components[component]).collect();
     (ledger_of(&entries, grid, params), dropped.len())
@@ -98,9 +104,10 @@ pub(crate) fn measure(runs: &Runs, labelled: &Components, grid: &Grid) -> Vec<Co
 /// An entry for each dropped component, largest first; one for all beyond [`MAX_LISTED`].
 fn ledger_of(dropped: &[Component], grid: &Grid, params: &Params) -> Ledger {
     let millilitres = |n_voxels: usize| n_voxels as f64 * grid.voxel_volume_mm3() / 1000.0;
-    let mut rule = match params.components.limit() {
-        usize::MAX => String::new(),
-        limit => format!("the {limit} largest stay"),
+    let mut rule = match params.components {
+        Policy::Main => format!("those of at least {} % of the largest stay", 100.0 * MAIN_SHARE),
+        Policy::Auto | Policy::All => String::new(),
+        Policy::Largest | Policy::Count(_) => format!("the {} largest stay", params.components.limit()),
     };
     if params.min_component_ml > 0.0 {
         let joint = if rule.is_empty() { "" } else { ", " };

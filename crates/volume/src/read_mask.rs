@@ -92,7 +92,8 @@ impl File<'_> {
             Wish::Values { is_wanted, what } => {
                 self.named(check_limit(bits_bytes(stored), self.options))?;
                 let bits = self.named(stream::choose(stored, is_wanted, report))?;
-                Ok(Some(Selection::of(bits, what)))
+                let is_of_scan = params.method == Method::Threshold;
+                Ok(Some(Selection { is_of_scan, ..Selection::of(bits, what) }))
             }
             Wish::Kind => {
                 self.named(check_limit(bits_bytes(stored), self.options))?;

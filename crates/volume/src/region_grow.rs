@@ -42,7 +42,8 @@ pub(crate) fn grow(volume: &Volume, params: &Params) -> Result<Selection, Error>
     let (seed, seeds) = choose_seed(volume, params, &mut report)?;
     let (growth, band) = choose_band(volume, params, seed, &mut report)?;
     let bits = region(volume, seed, band)?;
-    Ok(Selection { bits, what: format!("the region in {} to {}", band.0, band.1), report, growth, seeds })
+    let what = format!("the region in {} to {}", band.0, band.1);
+    Ok(Selection { report, growth, seeds, ..Selection::of_scan(bits, what) })
 }
 
 /// The seed of the parameters, else the trachea.

@@ -3,7 +3,7 @@
 //! **Input** a volume and [`Params`]. **Output** [`Segmented`].
 //! **Steps** 0. a scan that is wanted at another spacing is resampled; 1. choose the organ's voxels by value, or by
 //! growing from a seed; 2. turn the axes to right, anterior, superior; 3. a mask that is wanted at another spacing is
-//! resampled; 4. close gaps; 5. drop all but the largest components; 6. fill cavities; 7. close tunnels that are faults
+//! resampled; 4. close gaps; 5. drop the components that are not wanted; 6. fill cavities; 7. close tunnels that are faults
 //! of the mask.
 //! **Guarantees** the mask has at least one voxel, and lies where the volume does; it depends on what is in the volume,
 //! not on the order in which a file stores it; every step's effect is in the report.
@@ -130,7 +130,9 @@ pub(crate) fn segment_selection(
     if n_selected == grid.n_voxels() {
         report.warn("W-VOLUME-FULL", format!("{} holds every voxel of the volume", selection.what));
     }
-    let cleaned = clean_within(Mask::new(grid.clone(), selection.bits), params, max_bytes)?;
+    let components = params.components.settled(selection.is_of_scan);
+    let params = Params { components, ..params.clone() };
+    let cleaned = clean_within(Mask::new(grid.clone(), selection.bits), &params, max_bytes)?;
     report.extend(cleaned.report);
     Ok(Segmented { report, growth: selection.growth, seeds: selection.seeds, ..cleaned })
 }
@@ -146,6 +148,7 @@ pub fn clean(mask: Mask, params: &Params) -> Result<Segmented, Error> {
 /// [`clean`], where no step takes more than `max_bytes` of memory at a time.
 fn clean_within(mask: Mask, params: &Params, max_bytes: u64) -> Result<Segmented, Error> {
     params.validate()?;
+    let params = &Params { components: params.components.settled(false), ..params.clone() };
     let mut report = Report::default();
     // What follows settles ties by storage order, here and in the later stages.
     let stored_orientation = mask.grid().orientation();
@@ -176,7 +179,7 @@ fn clean_within(mask: Mask, params: &Params, max_bytes: u64) -> Result<Segmented
         closed = filled.entries;
     }
 
-    // Drop all but the largest components.
+    // Drop components.
     let runs = Runs::cut(&bits);
     let (dropped, n_dropped) = components::keep(&mut bits, &runs, &grid, params, &mut report);
     let mut ledger = Ledger(closed);

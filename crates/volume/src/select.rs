@@ -21,6 +21,8 @@ const N_LISTED: usize = 20;
 pub(crate) struct Selection {
     pub(crate) bits: Bits,
     pub(crate) what: String,
+    /// Whether intensities have chosen them.
+    pub(crate) is_of_scan: bool,
     /// What was counted and seen on the way.
     pub(crate) report: Report,
     /// How a region grew, and from where it could have.
@@ -30,7 +32,13 @@ pub(crate) struct Selection {
 
 impl Selection {
     pub(crate) fn of(bits: Bits, what: impl Into<String>) -> Self {
-        Self { bits, what: what.into(), report: Report::default(), growth: None, seeds: Vec::new() }
+        let report = Report::default();
+        Self { bits, what: what.into(), is_of_scan: false, report, growth: None, seeds: Vec::new() }
+    }
+
+    /// The same of voxels that intensities have chosen.
+    pub(crate) fn of_scan(bits: Bits, what: impl Into<String>) -> Self {
+        Self { is_of_scan: true, ..Self::of(bits, what) }
     }
 }
 
@@ -46,7 +54,10 @@ pub(crate) fn select(volume: &Volume, params: &Params) -> Result<Selection, Erro
                 }
             }
         }
-        Wish::Values { is_wanted, what } => Ok(Selection::of(choose(volume, is_wanted), what)),
+        Wish::Values { is_wanted, what } => {
+            let is_of_scan = params.method == Method::Threshold;
+            Ok(Selection { is_of_scan, ..Selection::of(choose(volume, is_wanted), what) })
+        }
         Wish::Names(labels) => select_names(volume, &labels),
         Wish::Region => region_grow::grow(volume, params),
     }
@@ -74,7 +85,7 @@ fn select_by_preset(volume: &Volume, preset: Preset, params: &Params) -> Result<
     let lower = params.lower.unwrap_or(VESSEL_FROM_HU);
     let upper = params.upper.unwrap_or(f64::INFINITY);
     let bits = choose(volume, |value| (lower..=upper).contains(&value));
-    let mut selection = Selection::of(bits, format!("the band {lower} to {upper}"));
+    let mut selection = Selection::of_scan(bits, format!("the band {lower} to {upper}"));
     let message = format!("preset \"vessel\" without a seed: all from {lower} on, bone as well as vessels");
     selection.report.warn("W-VOLUME-PRESET", message);
     Ok(selection)

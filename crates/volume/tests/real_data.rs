@@ -148,7 +148,7 @@ fn masks_are_counted_as_scipy_counts_them() {
         let loaded = load(&format!("{name}.nii.gz")).expect("data is set");
         assert!(matches!(inspect_kind(&loaded.volume), Kind::Mask { .. }), "{name}");
         assert_eq!(loaded.volume.grid().orientation(), orientation, "{name}");
-        let params = Params { close_tunnels: false, ..Params::default() };
+        let params = Params { components: Components::Largest, close_tunnels: false, ..Params::default() };
         let segmented = segment(&loaded.volume, &params).expect("a mask");
         let count = |key| segmented.report.get(key).unwrap_or(f64::NAN) as usize;
         let found = (
@@ -161,6 +161,29 @@ fn masks_are_counted_as_scipy_counts_them() {
         // One entry for each dropped component, and one for those beyond 200.
         let n_dropped = expected.1 - 1;
         assert_eq!(segmented.ledger.0.len(), n_dropped.min(200) + usize::from(n_dropped > 200), "{name}");
+    }
+}
+
+/// The vessels of two lungs are two trees and a part of one; of the other masks nothing but the largest component stays.
+#[test]
+fn two_lungs_stay() {
+    if data().is_none() {
+        return;
+    }
+    for (name, _, (_, n_components, largest, _)) in MASKS {
+        let loaded = load(&format!("{name}.nii.gz")).expect("data is set");
+        let params = Params { close_tunnels: false, fill_cavities: false, ..Params::default() };
+        let segmented = segment(&loaded.volume, &params).expect("a mask");
+        let (n_kept, n_voxels) = match name {
+            "medmpd_lungs2_vessels" => (3, 160_883 + 107_612 + 19_105),
+            _ => (1, largest),
+        };
+        assert_eq!(segmented.mask.n_foreground(), n_voxels, "{name}");
+        assert_eq!(
+            segmented.report.get("components_dropped"),
+            Some((n_components - n_kept) as f64),
+            "{name}"
+        );
     }
 }
 

@@ -89,7 +89,8 @@ fn the_seed_is_told_where_to_go() {
 fn components_and_their_ledger() {
     // Corners connect; the lone voxels at the ends do not.
     let text = "7....7 .7...7 7....7";
-    let largest = check(text, &Params::default(), "#..... .#.... #.....");
+    let one = Params { components: Components::Largest, ..Params::default() };
+    let largest = check(text, &one, "#..... .#.... #.....");
     assert_eq!(largest.report.get("components"), Some(2.0));
     assert_eq!(largest.report.get("components_dropped_voxels"), Some(3.0));
     assert_eq!(largest.ledger.0.len(), 1);
@@ -101,11 +102,34 @@ fn components_and_their_ledger() {
 
     // 250 single voxels beside a pair: 200 entries and one for the other 50.
     let dots = "7.".repeat(250) + "77.";
-    let many = segment(&volume(&dots), &Params::default()).expect("a mask");
+    let many = segment(&volume(&dots), &one).expect("a mask");
     assert_eq!((many.mask.n_foreground(), many.ledger.0.len()), (2, 201));
     assert!(many.ledger.0[200].reason.starts_with("50 further components of 50 voxels, at most 1 each"));
     // The 50 are at x = 400, 402, …, 498.
     assert_eq!(many.ledger.0[200].position_mm.x, 10.0 + 449.0);
+}
+
+/// Of a mask two lungs stay and noise goes; of a scan the largest component alone.
+#[test]
+fn main_components() {
+    let text = format!("{}.{}.7.7", "7".repeat(40), "7".repeat(3));
+    let two = format!("{}.{}....", "#".repeat(40), "#".repeat(3));
+    let lungs = check(&text, &Params::default(), &two);
+    let reason = "component of 1 voxels, 0.0100 ml; those of at least 5 % of the largest stay";
+    assert_eq!(lungs.ledger.0.iter().map(|entry| entry.reason.as_str()).collect::<Vec<_>>(), [reason; 2]);
+    assert_eq!(lungs.report.get("components_dropped"), Some(2.0));
+    check(&text, &Params { label: Some(7.0.into()), ..Params::default() }, &two);
+    let band = Params { method: Method::Threshold, lower: Some(5.0), ..Params::default() };
+    let alone = check(&text, &band, &format!("{}........", "#".repeat(40)));
+    assert_eq!(alone.report.get("components_dropped"), Some(3.0));
+    check(&text, &Params { components: Components::Main, ..band }, &two);
+    check(&text, &Params { min_component_ml: 0.1, ..Params::default() }, &alone_of(&two));
+}
+
+/// The first piece of a row.
+fn alone_of(row: &str) -> String {
+    let (first, rest) = row.split_once('.').expect("two pieces");
+    format!("{first}.{}", rest.replace('#', "."))
 }
 
 #[test]
@@ -178,6 +202,8 @@ fn parameters_are_checked() {
         assert_eq!(key(text), expected, "{text}");
     }
     for (text, expected) in [
+        ("components = 'auto'", Components::Auto),
+        ("components = 'main'", Components::Main),
         ("components = 'largest'", Components::Largest),
         ("components = 'all'", Components::All),
         ("components = 3", Components::Count(3)),
