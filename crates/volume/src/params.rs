@@ -182,7 +182,7 @@ pub enum Components {
     Auto,
     /// The one with the most voxels.
     Largest,
-    /// Those with at least [`MAIN_SHARE`] of its voxels.
+    /// Those with at least a twentieth of its voxels.
     Main,
     /// All of them.
     All,
