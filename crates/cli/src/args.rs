@@ -26,6 +26,7 @@ Examples:
   espalier verify out/airway                            does everything hold that the folder says?
   espalier locate out/airway -32.7,-168.8,-161.8        where is this point of the scan on the map?
   espalier sweep my.toml --over embed.w_length=0.5,1,2  losses against a setting: table and plot
+  espalier group out -o group                           one page over all runs in a folder
   espalier phantom airway -o phantoms/airway            test data with its truth
 
 Exit codes:
@@ -129,6 +130,8 @@ pub(crate) enum Command {
     Juxtapose(JuxtaposeArguments),
     /// A config at many settings: a table and a plot of the losses
     Sweep(SweepArguments),
+    /// One page over many runs: maps, numbers, outliers, failures
+    Group(GroupArguments),
     /// Make a phantom with its truth: CT, mask and tree
     Phantom(PhantomArguments),
     /// CT or label map -> mask:  espalier volume CT -o DIR
@@ -278,6 +281,38 @@ pub(crate) struct SweepArguments {
     /// Where the results go [default: out/NAME-sweep]
     #[arg(short, long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+}
+
+const GROUP_HELP: &str = "\
+Writes into the folder: group.html (one file: the maps in small, a table that sorts and filters, distributions, outliers,
+runs without a map with the reason and the commands that try again, equal inputs, settings that differ), group.tsv and
+group.json (a row per run), dictionary.tsv (what each column means).
+
+Runs are labelled with their folders as you type them, without what all have in common; nothing else of a run's name or
+input is on the page. If folders are named after patients, say --anonymous. A run that cannot be read, or has not come to a
+map, is a row with its reason; exit code 74 if no folder holds a run.
+
+Examples:
+  espalier group out -o group                           all run folders in out
+  espalier group out/case-* -o group --title \"Cohort A\"
+  espalier group out --anonymous -o share               labels run-1, run-2, …";
+
+/// `espalier group`.
+#[derive(Debug, Args)]
+#[command(after_help = GROUP_HELP)]
+pub(crate) struct GroupArguments {
+    /// Run folders, or folders that have run folders in them
+    #[arg(required = true, value_name = "RUN|FOLDER")]
+    pub(crate) folders: Vec<PathBuf>,
+    /// Where the results go
+    #[arg(short, long, value_name = "DIR", default_value = "out/group")]
+    pub(crate) out: PathBuf,
+    /// The heading of the page
+    #[arg(long, value_name = "TEXT")]
+    pub(crate) title: Option<String>,
+    /// Number the runs in place of their folders' names
+    #[arg(long)]
+    pub(crate) anonymous: bool,
 }
 
 /// `espalier phantom`.

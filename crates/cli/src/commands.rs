@@ -11,14 +11,15 @@ use clap::CommandFactory;
 use espalier_model::Diagnose;
 use espalier_model::diagnose::Class;
 use espalier_pipeline::{
-    Align, Artifact, ChangeOf, CompareRequest, Config, Error, JuxtaposeParams, JuxtaposeRequest, Loaded,
-    Override, Plan, PlotRequest, Plotted, Reason, Request, SideFile, Space, Stage, Subject, Summary,
-    SweepRequest, WayTo,
+    Align, Artifact, ChangeOf, CompareRequest, Config, Error, GroupRequest, JuxtaposeParams,
+    JuxtaposeRequest, Loaded, Override, Plan, PlotRequest, Plotted, Reason, Request, SideFile, Space, Stage,
+    Subject, Summary, SweepRequest, WayTo,
 };
 
 use crate::args::{
-    Arguments, Command, CompareArguments, JuxtaposeArguments, LocateArguments, PhantomArguments,
-    PlaceArguments, ProfileArguments, Rerun, RunArguments, StageArguments, SweepArguments, VerifyArguments,
+    Arguments, Command, CompareArguments, GroupArguments, JuxtaposeArguments, LocateArguments,
+    PhantomArguments, PlaceArguments, ProfileArguments, Rerun, RunArguments, StageArguments, SweepArguments,
+    VerifyArguments,
 };
 use crate::checks;
 use crate::progress::{self, Progress};
@@ -34,6 +35,7 @@ pub(crate) fn execute(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Compare(compare) => run_compare(arguments, compare)?,
         Command::Juxtapose(juxtapose) => run_juxtapose(arguments, juxtapose)?,
         Command::Sweep(sweep) => run_sweep(arguments, sweep)?,
+        Command::Group(group) => run_group(arguments, group)?,
         Command::Phantom(phantom) => make_phantom(arguments, phantom)?,
         Command::Volume(stage) => run_stage(arguments, stage, Stage::Volume)?,
         Command::Skeleton(stage) => run_stage(arguments, stage, Stage::Skeleton)?,
@@ -260,6 +262,20 @@ fn run_sweep(arguments: &Arguments, sweep: &SweepArguments) -> anyhow::Result<Su
     let swept = espalier_pipeline::sweep(&request, &|event| progress.show(event))?;
     progress::result(&swept.table);
     Ok(swept.summary)
+}
+
+fn run_group(arguments: &Arguments, group: &GroupArguments) -> anyhow::Result<Summary> {
+    let request = GroupRequest {
+        folders: group.folders.clone(),
+        out: group.out.clone(),
+        title: group.title.clone(),
+        is_anonymous: group.anonymous,
+        threads: arguments.common.threads.map(usize::from),
+    };
+    let grouped = espalier_pipeline::group(&request)?;
+    grouped.notes.iter().for_each(|note| progress::line(&format!("note: {note}")));
+    progress::result(&grouped.table);
+    Ok(grouped.summary)
 }
 
 fn make_phantom(arguments: &Arguments, phantom: &PhantomArguments) -> anyhow::Result<Summary> {

@@ -211,6 +211,24 @@ fn no_text_and_no_path_of_an_input_reaches_a_result() {
         run(folder.path(), &input, end, &[]);
         check(&folder.path().join(end), &marks);
     }
+    // Labels are folders as they are typed, or numbers; what lies above stays above.
+    let shown = folder.path().join(FOLDER).join("runs");
+    fs::create_dir(&shown).expect("folder");
+    for end in ["nii", "mha"] {
+        fs::rename(folder.path().join(end), shown.join(end)).expect("renamed");
+    }
+    fs::rename(folder.path().join("swc"), folder.path().join(NAME)).expect("renamed");
+    let shown = shown.display().to_string();
+    for arguments in
+        [["group", &shown, "nrrd", "-o", "typed"], ["group", ".", "--anonymous", "-o", "numbered"]]
+    {
+        let output = espalier(folder.path(), &arguments);
+        assert!(output.status.success(), "{}", stderr(&output));
+        check(&folder.path().join(arguments[arguments.len() - 1]), &marks);
+    }
+    let table = fs::read_to_string(folder.path().join("typed/group.tsv")).expect("a table");
+    let labels: Vec<&str> = table.lines().skip(1).filter_map(|line| line.split('\t').next()).collect();
+    assert_eq!(labels, ["mha", "nii", "nrrd"]);
 }
 
 #[test]

@@ -57,6 +57,20 @@ pub enum Error {
         /// The file that is not there.
         missing: &'static str,
     },
+    /// None of the folders of a group holds a run.
+    #[error("{} holds no run folder", shown(folders))]
+    NoGroup {
+        /// The folders.
+        folders: Vec<PathBuf>,
+    },
+    /// More runs than a page may have.
+    #[error("the group has {n_runs} runs, allowed are {limit}")]
+    GroupSize {
+        /// How many there are.
+        n_runs: usize,
+        /// How many there may be.
+        limit: usize,
+    },
     /// Results would be written among those of a run.
     #[error("{folder} is a run folder; its own results would be overwritten", folder = folder.display())]
     RunInTheWay {
@@ -277,6 +291,13 @@ impl NotSwept {
     }
 }
 
+/// A few folders, and how many more.
+fn shown(folders: &[PathBuf]) -> String {
+    let named: Vec<String> = folders.iter().take(3).map(|folder| folder.display().to_string()).collect();
+    let more = folders.len().saturating_sub(3);
+    if more > 0 { format!("none of {} and {more} more", named.join(", ")) } else { named.join(" or ") }
+}
+
 impl Error {
     pub(crate) fn stage(stage: Stage) -> impl Fn(Box<dyn Diagnose + Send + Sync>) -> Self {
         move |cause| Self::Stage { stage, cause }
@@ -298,6 +319,8 @@ impl Diagnose for Error {
             Self::Point { cause, .. } => cause.code(),
             Self::NoSuchSpace { .. } => "E-LOCATE-SPACE",
             Self::NoRun { .. } => "E-COMPARE-NO-RUN",
+            Self::NoGroup { .. } => "E-GROUP-NO-RUN",
+            Self::GroupSize { .. } => "E-GROUP-SIZE",
             Self::RunInTheWay { .. } => "E-COMPARE-FOLDER",
             Self::Settled { .. } => "E-COMPARE-SETTINGS",
             Self::SettledTree { .. } => "E-JUXTAPOSE-SETTINGS",
@@ -338,8 +361,10 @@ impl Diagnose for Error {
             | Self::SettledTree { .. }
             | Self::NotSwept { .. }
             | Self::SweepSize { .. }
+            | Self::GroupSize { .. }
             | Self::Threads { .. } => Class::Usage,
             Self::NoRun { .. }
+            | Self::NoGroup { .. }
             | Self::NoTree { .. }
             | Self::MissingArtifact { .. }
             | Self::Read { .. }
@@ -367,6 +392,10 @@ impl Diagnose for Error {
             Self::SettledTree { .. } => {
                 "of finished runs seed, views.*, embed.* and render.* can be changed; or give the configs".to_owned()
             }
+            Self::NoGroup { .. } => {
+                "name run folders, or a folder that has run folders in it, such as the one that espalier run writes to".to_owned()
+            }
+            Self::GroupSize { .. } => "show them in several groups".to_owned(),
             Self::RunInTheWay { .. } => "choose another folder with -o".to_owned(),
             Self::NotSwept { .. } => "write --over KEY=V1,V2,…, such as --over embed.w_length=0.5,1,2,4".to_owned(),
             Self::SweepSize { .. } => "give fewer values, or sweep one key at a time".to_owned(),

@@ -10,9 +10,10 @@
 //! | methods and runs side by side | [`compare`](mod@compare) |
 //! | two runs on one shared map | [`juxtapose`](mod@juxtapose) |
 //! | a config at many settings | [`sweep`](mod@sweep) |
+//! | one page over many runs | [`group`](mod@group) |
 //! | the run folder: atomic files, digests; one run at a time | `folder`, `lock` |
 //! | what a stage's results were made from, and whether they still stand | `record` |
-//! | how a result came about, what each method cost | `provenance`, `methods` |
+//! | how a result came about, what each method cost, why a run stopped | `provenance`, `methods`, `failure` |
 //! | the page of a run: what it is made from | `page` |
 //! | what the columns of the tables mean | `dictionary` |
 //! | a point of the scan on the map, and back | [`mod@locate`] |
@@ -31,7 +32,9 @@ pub mod config;
 mod dictionary;
 mod error;
 mod event;
+mod failure;
 mod folder;
+pub mod group;
 pub mod juxtapose;
 pub mod locate;
 mod lock;
@@ -59,6 +62,7 @@ pub use espalier_render::ChangeOf;
 pub use espalier_verify::{Check, Outcome};
 pub use espalier_volume::is_dicom_folder;
 pub use event::Event;
+pub use group::{GroupRequest, Grouped, group};
 pub use juxtapose::{JuxtaposeRequest, JuxtaposedRuns, juxtapose};
 pub use locate::{Given, Located, Space, locate, read_point, read_points};
 pub use phantom::make_phantom;

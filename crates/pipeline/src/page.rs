@@ -82,7 +82,8 @@ pub(crate) fn report(step: &mut Step<'_>) -> Result<Outcome, Error> {
     Ok(Outcome { files, report: made.report, line })
 }
 
-const LEDGER: &str = "topology.tsv";
+/// The topology ledger.
+pub(crate) const LEDGER: &str = "topology.tsv";
 
 /// Slices of the scan, for the page: drawn where the scan is read, since it may not be there later. None where the input
 /// is a mask or a label map, which has no more to show than its outline.
@@ -172,7 +173,7 @@ struct WarningRecord {
 }
 
 /// What each stage before has said, from its report.
-fn said(folder: &RunFolder, stages: &[Stage]) -> Result<Vec<StageFacts>, Error> {
+pub(crate) fn said(folder: &RunFolder, stages: &[Stage]) -> Result<Vec<StageFacts>, Error> {
     let mut said = Vec::new();
     for stage in stages.iter().filter(|stage| **stage < Stage::Report) {
         let text = folder.text_if_there(&format!("{}/report.json", stage.folder()))?;

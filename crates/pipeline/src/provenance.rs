@@ -111,6 +111,12 @@ pub(crate) fn write_side_file(
     folder.write(INPUTS_FILE, table.as_bytes())
 }
 
+/// The digests of the input's files, from the text of `provenance/inputs.tsv`.
+pub(crate) fn input_digests(table: &str) -> Vec<String> {
+    let rows = table.lines().filter(|row| is_of(INPUT, row));
+    rows.filter_map(|row| row.split('\t').nth(2)).map(str::to_owned).collect()
+}
+
 /// Whether the folder's results were made from files of other content.
 pub(crate) fn is_other_input(folder: &RunFolder, input: &[PathBuf]) -> Result<bool, Error> {
     let Some(known) = rows(folder)? else { return Ok(false) };

@@ -10,6 +10,7 @@ use crate::clock::Stopwatch;
 use crate::config::{Config, Loaded, Source, Unit};
 use crate::error::Error;
 use crate::event::Event;
+use crate::failure;
 use crate::folder::{RunFolder, hex_digest};
 use crate::lock::Patience;
 use crate::provenance::{self, StageCost};
@@ -84,9 +85,11 @@ fn run_stages(request: &Request, events: &(dyn Fn(Event) + Sync)) -> Result<Summ
     let patience = if request.wait { Patience::Wait(&say_so) } else { Patience::None };
     let mut folder = RunFolder::open_or_wait(&request.out, patience)?;
     folder.forget_unless(is_known);
+    failure::clear(&folder);
     let done = run.perform(&mut folder, &stages);
-    if done.is_err() {
+    if let Err(error) = &done {
         folder.remove_if_unused();
+        failure::write(&folder, error, run.input.as_deref());
         let kept = run.costs.iter().map(|cost| cost.stage).collect();
         events(Event::Stopped { kept, out: request.out.clone() });
     }

@@ -118,13 +118,8 @@ pub(crate) fn listed(config: &Config, stages: &[Stage]) -> Vec<(String, String, 
         let table = key.split('.').next().unwrap_or_default();
         table == "input" || stages.iter().any(|stage| stage.name() == table)
     };
-    let flat = |config: &Config| {
-        let mut keys = BTreeMap::new();
-        flatten("", &toml::from_str(&config.to_toml()).unwrap_or_default(), &mut keys);
-        keys
-    };
-    let mut defaults = flat(&Config::default());
-    let mut listed: Vec<_> = flat(&config)
+    let mut defaults = flat(&Config::default().to_toml());
+    let mut listed: Vec<_> = flat(&config.to_toml())
         .into_iter()
         .map(|(key, value)| {
             let default = defaults.remove(&key);
@@ -134,6 +129,13 @@ pub(crate) fn listed(config: &Config, stages: &[Stage]) -> Vec<(String, String, 
     listed.extend(defaults.into_iter().map(|(key, default)| (key, "not set".to_owned(), Some(default))));
     listed.retain(|(key, ..)| is_shown(key));
     listed
+}
+
+/// Every setting in the text of a resolved config, by dotted key; none where it is no TOML.
+pub(crate) fn flat(text: &str) -> BTreeMap<String, String> {
+    let mut keys = BTreeMap::new();
+    flatten("", &toml::from_str(text).unwrap_or_default(), &mut keys);
+    keys
 }
 
 /// The values of a table and of those in it, by dotted key.

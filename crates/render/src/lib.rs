@@ -11,7 +11,7 @@
 //! | 6 | `raster`, `tiles`, `samples`, `shade` | the pixels |
 //! | 7 | `reformation` | the pixels of a scan along the map, in place of 5 and 6 |
 //! | 8 | `paint`, `svg`, `outline`, `layers` | the files |
-//! | 9 | `side_by_side`, `tiling`, `parts`; `juxtaposed`; `chart`, `convergence`, `profile` | several layouts in one figure; two trees on one map; charts of numbers |
+//! | 9 | `side_by_side`, `tiling`, `parts`; `juxtaposed`; `chart`, `convergence`, `profile`; `thumbnail` | several layouts in one figure; two trees on one map; charts of numbers; a map among many |
 //!
 //! **Source** section 4.1 of [Hu2022].
 
@@ -59,6 +59,7 @@ mod juxtaposed;
 mod parts;
 mod profile;
 mod side_by_side;
+mod thumbnail;
 mod tiling;
 
 mod error;
@@ -88,6 +89,7 @@ use reformation::{Reformation, Tally};
 use scene::Scene;
 pub use side_by_side::{Panel, Section, SideBySide, side_by_side};
 use text::Face;
+pub use thumbnail::{Thumbnail, thumbnail};
 
 /// The pictures of a tree.
 #[derive(Clone, Debug, PartialEq)]

@@ -89,6 +89,11 @@ impl Canvas {
         png::stream(self.pixmap.data(), self.pixmap.width(), self.pixmap.height()).concat()
     }
 
+    /// The picture as PNG with at most 256 colours.
+    pub(crate) fn small_png(&self) -> Vec<u8> {
+        png::encode_in_few_colors(self.pixmap.data(), self.pixmap.width(), self.pixmap.height())
+    }
+
     /// The picture as PNG.
     pub(crate) fn png(&self) -> Vec<u8> {
         png::encode(self.pixmap.data(), self.pixmap.width(), self.pixmap.height())

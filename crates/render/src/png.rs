@@ -10,6 +10,8 @@
 //! is three chunks.
 //! **Cost** O(pixels) time; the file, and a strip for each thread.
 
+use std::collections::BTreeMap;
+
 use flate2::{Compress, Compression, FlushCompress, Status};
 use rayon::prelude::*;
 
@@ -34,6 +36,56 @@ pub(crate) fn encode(pixels: &[u8], width: u32, height: u32) -> Vec<u8> {
     }
     chunk(&mut file, *b"IEND", &[]);
     file
+}
+
+/// Packs a small picture with at most 256 colours: pixels of like colour (the same upper four bits of each part) share their
+/// mean, and those that are left over when 256 are taken have the nearest. A third of the bytes of [`encode`].
+pub(crate) fn encode_in_few_colors(pixels: &[u8], width: u32, height: u32) -> Vec<u8> {
+    let (palette, indices) = few_colors(pixels);
+    let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
+    let mut header = Vec::with_capacity(13);
+    header.extend(width.to_be_bytes());
+    header.extend(height.to_be_bytes());
+    // 8 bits, indexed, deflate, adaptive filters, not interlaced.
+    header.extend([8, 3, 0, 0, 0]);
+    chunk(&mut file, *b"IHDR", &header);
+    chunk(&mut file, *b"PLTE", palette.as_flattened());
+    // Indices are no amounts: no filter helps.
+    let rows = indices.chunks((width as usize).max(1));
+    let plain: Vec<u8> = rows.flat_map(|row| std::iter::once(0).chain(row.iter().copied())).collect();
+    let stream = [vec![0x78, 0x5e], deflate(&plain, true), adler(&plain).to_be_bytes().to_vec()];
+    chunk(&mut file, *b"IDAT", &stream.concat());
+    chunk(&mut file, *b"IEND", &[]);
+    file
+}
+
+/// At most 256 colours, and which of them each pixel has.
+fn few_colors(pixels: &[u8]) -> (Vec<[u8; 3]>, Vec<u8>) {
+    let key = |rgba: &[u8]| [rgba[0] >> 4, rgba[1] >> 4, rgba[2] >> 4];
+    let mut sums: BTreeMap<[u8; 3], [u64; 4]> = BTreeMap::new();
+    for rgba in pixels.chunks_exact(4) {
+        let sum = sums.entry(key(rgba)).or_default();
+        (0..3).for_each(|part| sum[part] += u64::from(rgba[part]));
+        sum[3] += 1;
+    }
+    let mut by_count: Vec<([u8; 3], [u64; 4])> = sums.into_iter().collect();
+    by_count.sort_by_key(|(key, [.., n])| (std::cmp::Reverse(*n), *key));
+    let mean = |[r, g, b, n]: [u64; 4]| [r, g, b].map(|sum| ((sum + n / 2) / n) as u8);
+    let palette: Vec<[u8; 3]> = by_count.iter().take(256).map(|(_, sum)| mean(*sum)).collect();
+    let nearest = |color: [u8; 3]| {
+        let off = |other: &[u8; 3]| -> u32 {
+            color.iter().zip(other).map(|(a, b)| u32::from(a.abs_diff(*b)).pow(2)).sum()
+        };
+        palette.iter().enumerate().min_by_key(|(_, other)| off(other)).map_or(0, |(index, _)| index)
+    };
+    let index_of: BTreeMap<[u8; 3], u8> = by_count
+        .iter()
+        .enumerate()
+        .map(|(rank, (key, sum))| (*key, if rank < 256 { rank } else { nearest(mean(*sum)) } as u8))
+        .collect();
+    let index = |rgba: &[u8]| index_of.get(&key(rgba)).copied().unwrap_or(0);
+    let indices = pixels.chunks_exact(4).map(index).collect();
+    (palette, indices)
 }
 
 /// The zlib stream of a PNG, in pieces.

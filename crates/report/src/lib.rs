@@ -8,6 +8,7 @@
 //! | 4 | `verdict` … `provenance` | one section a file, in the order in which they are read |
 //! | 5 | `methods` | what was done, in sentences, with its citations |
 //! | 6 | `page` | the frame that holds them: head, style, script |
+//! | 7 | [`group`](mod@group) | one page over many runs |
 //!
 //! **Input** [`Facts`]. **Output** [`Made`]: `report.html`, `methods.md`, `references.bib`.
 //! **Guarantees** the page asks for nothing outside of itself; every text is escaped where it is put in; the same facts
@@ -43,6 +44,7 @@ mod worst;
 mod bibliography;
 mod methods;
 
+pub mod group;
 pub mod page;
 
 use espalier_model::Report;

@@ -1,0 +1,147 @@
+//! One page over many runs.
+//!
+//! **Input** run folders, or folders that have run folders in them. **Output** in a folder of its own: `group.html`,
+//! `group.tsv`, `group.json`, `dictionary.tsv`, sealed by `SHA256SUMS`.
+//! **Steps** 1. The run folders, each once. 2. A label for each. 3. Of each run its tree, its map and what its stages
+//! said, every file checked against the run's digests; what cannot be read makes it a failure with its code, not an end of
+//! the whole. 4. Page and tables.
+//! **Guarantees** nothing of a run but its label, numbers, digests and a picture of its map: neither the name in its
+//! config nor any path of its input. The label is what the user has typed, as far as it tells runs apart, and no folder
+//! above it; `is_anonymous` numbers the runs instead. The same bytes at any number of threads.
+//! **Cost** memory for one tree a thread, and the pictures.
+
+mod labels;
+mod read;
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use espalier_report::group::{GroupOutcome, GroupRun};
+use rayon::prelude::*;
+
+use crate::error::Error;
+use crate::folder::RunFolder;
+use crate::run::{Summary, in_pool};
+use crate::settings;
+
+/// The most runs on a page.
+const MOST_RUNS: usize = 10_000;
+/// Side of a map in pixels, by how many runs there are at most: the page must pass as an attachment.
+const SIDES_PX: [(usize, u32); 4] = [(24, 320), (100, 220), (400, 150), (usize::MAX, 96)];
+
+/// A group to be shown.
+#[derive(Clone, Debug)]
+pub struct GroupRequest {
+    /// Run folders, or folders that have run folders in them.
+    pub folders: Vec<PathBuf>,
+    /// Where the results go.
+    pub out: PathBuf,
+    /// The heading; "Group of runs" if nobody says.
+    pub title: Option<String>,
+    /// Whether runs are numbered in place of their labels.
+    pub is_anonymous: bool,
+    /// Threads; `None` for one per core.
+    pub threads: Option<usize>,
+}
+
+/// What a group came to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Grouped {
+    /// The sums, for a terminal.
+    pub table: String,
+    /// Folders that were given twice, or hold no run beside those that do.
+    pub notes: Vec<String>,
+    /// The folder and its digest.
+    pub summary: Summary,
+}
+
+/// A folder that is to be a run.
+struct Found {
+    /// As the user gave it, with the name of the folder below where that has the runs.
+    given: PathBuf,
+    /// Whether it is a run folder.
+    is_run: bool,
+}
+
+/// Shows a group of runs.
+///
+/// # Errors
+/// [`Error`] if no folder is a run folder, there are too many, or the results cannot be written. A run that cannot be read
+/// is no error: the page lists it.
+pub fn group(request: &GroupRequest) -> Result<Grouped, Error> {
+    if request.out.join(settings::FILE).exists() {
+        return Err(Error::RunInTheWay { folder: request.out.clone() });
+    }
+    let (found, notes) = find(request)?;
+    let paths: Vec<&Path> = found.iter().map(|found| found.given.as_path()).collect();
+    let labels = if request.is_anonymous { labels::numbered(paths.len()) } else { labels::of(&paths) };
+    let side_px = SIDES_PX.iter().find(|(most, _)| found.len() <= *most).map_or(96, |(_, side)| *side);
+    let runs: Vec<GroupRun> = in_pool(request.threads, || {
+        let read = |(found, label): (&Found, &String)| {
+            let outcome = if found.is_run {
+                read::run(&found.given, label, side_px)
+            } else {
+                GroupOutcome::Failed(read::no_run(&found.given))
+            };
+            GroupRun { label: label.clone(), outcome }
+        };
+        Ok(found.par_iter().zip(&labels).map(read).collect())
+    })?;
+    let title = request.title.as_deref().filter(|title| !title.trim().is_empty());
+    let made = espalier_report::group::group(title.unwrap_or("Group of runs"), &runs);
+    let files = [
+        ("group.html", made.html),
+        ("group.tsv", made.tsv),
+        ("group.json", made.json),
+        ("dictionary.tsv", made.dictionary),
+    ];
+    let mut folder = RunFolder::open(&request.out)?;
+    for (file, text) in &files {
+        folder.write(file, text.as_bytes())?;
+    }
+    let highlights = files.iter().map(|(file, _)| (*file).to_owned()).collect();
+    let summary = Summary { out: request.out.clone(), highlights, digest: folder.seal()? };
+    Ok(Grouped { table: made.summary, notes, summary })
+}
+
+/// Every run folder once, in the order in which they were given, those of one folder by name; and what is to be said.
+fn find(request: &GroupRequest) -> Result<(Vec<Found>, Vec<String>), Error> {
+    let (mut found, mut notes, mut known) = (Vec::new(), Vec::new(), BTreeSet::new());
+    for given in &request.folders {
+        for (path, is_run) in runs_of(given) {
+            let place = fs::canonicalize(&path).unwrap_or_else(|_| path.clone());
+            if known.insert(place) {
+                found.push(Found { given: path, is_run });
+            } else {
+                notes.push(format!("{} was given twice and is shown once", path.display()));
+            }
+        }
+    }
+    if found.len() > MOST_RUNS {
+        return Err(Error::GroupSize { n_runs: found.len(), limit: MOST_RUNS });
+    }
+    if !found.iter().any(|found| found.is_run) {
+        return Err(Error::NoGroup { folders: request.folders.clone() });
+    }
+    Ok((found, notes))
+}
+
+/// The run folders that a path stands for, with whether they are; itself if there is none.
+fn runs_of(given: &Path) -> Vec<(PathBuf, bool)> {
+    if is_run(given) {
+        return vec![(given.to_owned(), true)];
+    }
+    let entries = fs::read_dir(given).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut below: Vec<PathBuf> = entries.filter(|path| is_run(path)).collect();
+    below.sort();
+    if below.is_empty() {
+        return vec![(given.to_owned(), false)];
+    }
+    below.into_iter().map(|path| (path, true)).collect()
+}
+
+/// Whether a folder is one of a run, be it unfinished.
+fn is_run(path: &Path) -> bool {
+    path.join("provenance").is_dir()
+}
