@@ -177,7 +177,8 @@ pub fn embed_edited(
     let branches = tree.branches();
     let weights_report = weights::check(tree, &branches, params)?;
     let targets = targets::targets(tree, &branches, views, params.targets)?;
-    let problem = problem::Problem::new(tree, branches, targets, params);
+    let mut problem = problem::Problem::new(tree, branches, targets, params);
+    problem.is_crowded = prospect::is_crowded(&problem, params, seed);
     let (mirrored, mirrors_report) = solver::mirrors::mirrored(&problem, params, seed);
     let problems = select::Problems {
         frozen: mirrored.as_ref().unwrap_or(&problem),

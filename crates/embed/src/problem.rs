@@ -60,6 +60,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) w_side: f64,
     /// The typical edge length, in mm: the scale of the swarm's tolerance.
     pub(crate) scale_mm: f64,
+    /// Whether nothing that was tried brings the tree near its targets (see `prospect`).
+    pub(crate) is_crowded: bool,
 }
 
 impl<'a> Problem<'a> {
@@ -128,6 +130,7 @@ impl<'a> Problem<'a> {
             crossing_weight,
             w_side: params.w_side,
             scale_mm,
+            is_crowded: false,
         }
     }
 

@@ -21,6 +21,10 @@
 //!
 //! **Architecture Invariant:** no algorithms here, and no file access: files are bytes in and bytes out.
 
+/// How far a coordinate or a radius of a traced tree may be from 0, in mm: far beyond any organ in any unit that
+/// somebody took for mm, and a tenth of what a picture holds.
+pub(crate) const MAX_MM: f64 = 1e11;
+
 pub mod anatomy;
 mod bits;
 pub mod bytes;

@@ -23,12 +23,10 @@ use glam::DVec3;
 pub use error::PolydataError;
 
 use crate::swc::SwcScale;
-use crate::{RAS_FROM_LPS, Report};
+use crate::{MAX_MM, RAS_FROM_LPS, Report};
 
 /// The names of radius arrays, best first: VMTK's, ours, and what others write.
 const RADIUS_NAMES: [&str; 4] = ["MaximumInscribedSphereRadius", "radius_mm", "Radius", "radius"];
-/// As in [`swc`](crate::swc): far beyond any organ.
-const MAX_MM: f64 = 1e9;
 
 /// Lines through points that have radii.
 ///

@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::MAX_MM;
 use crate::diagnose::{Class, Diagnose};
 
 /// Why a VTK file cannot be read.
@@ -54,8 +55,8 @@ pub enum PolydataError {
         /// What is wrong.
         cause: &'static str,
     },
-    /// A point or radius that is not finite, or beyond 1e9 mm.
-    #[error("point {index} or its radius is not finite, or beyond 1e9 mm")]
+    /// A point or radius that is not finite, or beyond what is allowed.
+    #[error("point {index} or its radius is not finite, or beyond {MAX_MM:e} mm")]
     Point {
         /// Its index, from 0.
         index: usize,

@@ -2,8 +2,8 @@
 
 use thiserror::Error;
 
-use crate::TreeError;
 use crate::diagnose::{Class, Diagnose};
+use crate::{MAX_MM, TreeError};
 
 /// Why an SWC file cannot be used. Lines count from 1.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -54,7 +54,7 @@ pub enum SwcError {
         expected: &'static str,
     },
     /// A position or radius beyond any organ.
-    #[error("line {line}: {column} is {value_mm:e} mm, allowed are at most 1e9 mm")]
+    #[error("line {line}: {column} is {value_mm:e} mm, allowed are at most {MAX_MM:e} mm")]
     Range {
         /// The line.
         line: usize,

@@ -16,17 +16,15 @@
 //! **Refused** whatever could be read in two ways: NUL bytes, fewer than seven columns, commas and blanks mixed
 //! between the fields (decimal commas), duplicate ids even of equal lines, negative ids, parents that are
 //! missing or below −1, cycles, a node that names itself as parent, numbers that are not finite or that exceed
-//! 1e9 mm after scaling.
+//! [`MAX_MM`] after scaling.
 
 use glam::DVec3;
 
 use super::{SwcError, SwcScale, Traced, TracedNode};
-use crate::Report;
+use crate::{MAX_MM, Report};
 
 const N_COLUMNS: usize = 7;
 const COLUMN_NAMES: [&str; N_COLUMNS] = ["id", "type", "x", "y", "z", "radius", "parent"];
-/// Far beyond any organ, far below where lengths lose their precision or overflow.
-const MAX_MM: f64 = 1e9;
 /// Whole numbers written as floats are exact up to here.
 const MAX_EXACT: f64 = 9_007_199_254_740_992.0;
 /// How much of a faulty line an error shows.

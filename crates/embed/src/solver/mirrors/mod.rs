@@ -85,6 +85,10 @@ const POLISH_SHARE: f64 = 0.5;
 /// The settling: temperatures, and its evaluations as a share of those of the search.
 const SETTLING_TEMPERATURES: (f64, f64) = (0.3, 0.01);
 const SETTLING_SHARE: f64 = 0.15;
+/// A walk that is sent ahead: its evaluations as a share of those of the search (but none the longer for being large),
+/// and its prices.
+const SCOUT_SHARE: f64 = 0.01;
+const SCOUT_PRICES: f64 = 0.3;
 /// Full prices, against 1 for a crossing; that of the placement is times M, that of zigzags is per rad.
 const PLACEMENT_PRICE: f64 = 0.05;
 const SIBLINGS_PRICE: f64 = 1.0;
@@ -210,6 +214,22 @@ pub(crate) fn search(problem: &Problem, params: &SolverParams, seed: u64) -> Mir
     };
     settle_side_by_side(&mut walkers, &settling, seed);
     finish(problem, walkers, terms_at_start)
+}
+
+/// The share of the crossings that a short walk leaves; there must be some.
+pub(crate) fn share_left(problem: &Problem, params: &SolverParams, seed: u64) -> f64 {
+    let setting = Setting::new(problem, params.clearance, false);
+    let prices = prices(problem, SCOUT_PRICES);
+    let mut walker = Walker::new(State::new(&setting), prices);
+    let n_before = walker.best_terms.crossings;
+    let phase = Phase {
+        hottest: HOTTEST_AGAIN,
+        coldest: COLDEST,
+        prices,
+        n_evaluations: SCOUT_SHARE * EVALUATIONS * math::pow(problem.n_joints() as f64, EVALUATIONS_POWER),
+    };
+    walker.anneal(&phase, Stream::new(seed, Purpose::MirrorSearch, 0, ROUNDS.len() as u32 + 2));
+    walker.best_terms.crossings as f64 / n_before.max(1) as f64
 }
 
 /// The evaluations of one walk for a tree of that size.
