@@ -40,7 +40,8 @@ fn the_page_of_a_scan_names_no_file() {
         assert!(text.len() < 5_000_000);
     }
     let page = text(&out, "report.html");
-    assert!(page.matches("data:image/png;base64,").count() == 6, "three strips of slices, three shadows");
+    let n_pictures = page.matches("data:image/png;base64,").count();
+    assert_eq!(n_pictures, 7, "three strips of slices, three shadows, the organ in space");
     assert!(page.contains("volume.lower") && page.contains("(a file)"), "settings without names");
     let digest = text(&out, "provenance/inputs.tsv")
         .lines()
@@ -79,7 +80,7 @@ fn the_page_of_a_traced_tree_says_that_there_is_no_scan() {
     run(&fixture("neuron.swc"), folder.path(), &overrides, 2).expect("a run");
     let page = text(folder.path(), "report.html");
     assert!(page.contains("there is no scan and no mask"));
-    assert!(!page.contains("data:image"));
+    assert_eq!(page.matches("data:image").count(), 1, "the tree in space");
     assert!(!page.contains("<code>volume."), "no settings of stages that did not run");
     // Without a page its methods are still there.
     overrides.push(set("report.enabled", false));

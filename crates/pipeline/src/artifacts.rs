@@ -281,11 +281,11 @@ impl Artifacts {
         let loaded = espalier_volume::read(path, &self.beside_options())
             .map_err(|error| Error::stage(lookup.stage)(Box::new(error)))?;
         espalier_volume::check_regions(&loaded.volume).map_err(|error| Error::file(path, error))?;
-        let names = match self.side_paths.get(&SideFile::LabelNames) {
-            Some(path) => self.label_names(path)?,
-            None => BTreeMap::new(),
+        let (names, colors) = match self.side_paths.get(&SideFile::LabelNames) {
+            Some(path) => (self.label_names(path)?, label_table::parse_colors(&self.read_text(path)?)),
+            None => (BTreeMap::new(), BTreeMap::new()),
         };
-        Ok(Some(LabelMap { volume: loaded.volume, names, reach_mm }))
+        Ok(Some(LabelMap { volume: loaded.volume, names, colors, reach_mm }))
     }
 
     pub(crate) fn embedding(&mut self, lookup: Lookup<'_>) -> Result<Arc<Embedding>, Error> {

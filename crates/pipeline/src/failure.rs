@@ -9,6 +9,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use espalier_model::Diagnose;
+use espalier_model::diagnose::Class;
 
 use crate::error::Error;
 use crate::folder::RunFolder;
@@ -38,7 +39,8 @@ pub(crate) struct Failure {
 
 /// Notes why a run stopped. A folder that cannot be written to has other troubles.
 pub(crate) fn write(folder: &RunFolder, error: &Error, input: Option<&Path>) {
-    if !folder.path().exists() || matches!(error, Error::Locked { .. }) {
+    // A command that asks for what cannot be says nothing of the results that are there.
+    if !folder.path().exists() || matches!(error.class(), Class::Usage | Class::Locked) {
         return;
     }
     let (stage, message) = match error {
@@ -101,7 +103,7 @@ mod tests {
         let said = |message: &str, input: &str| {
             without_names(message, Path::new("out/DOE^JANE"), Some(Path::new(input)))
         };
-        assert_eq!(said("cannot read data/DOE^JANE.nii: gone", "data/DOE^JANE.nii"), "cannot read … gone");
+        assert_eq!(said("cannot read data/DOE^JANE.nii: gone", "data/DOE^JANE.nii"), "cannot read …: gone");
         assert_eq!(
             said("DOE^JANE.nii: no voxel of 3 mm/px is left", "data/DOE^JANE.nii"),
             "…: no voxel of 3 mm/px is left"

@@ -190,6 +190,11 @@ impl RunFolder {
         self.read(relative).map(|bytes| Some(String::from_utf8_lossy(&bytes).into_owned()))
     }
 
+    /// The bytes of a result file, checked; none if there is no such file.
+    pub(crate) fn checked_if_there(&self, relative: &str) -> Result<Option<Vec<u8>>, Error> {
+        if self.path.join(relative).exists() { self.read(relative).map(Some) } else { Ok(None) }
+    }
+
     /// Checks bytes against the digest that the folder has for them, if any.
     pub(crate) fn check(&self, relative: &str, bytes: &[u8]) -> Result<(), Error> {
         match self.digests.get(relative) {

@@ -14,6 +14,7 @@ use crate::artifacts::Artifacts;
 use crate::config::Source;
 use crate::error::Error;
 use crate::folder::RunFolder;
+use crate::labels;
 use crate::provenance;
 use crate::run::stages_of;
 use crate::settings;
@@ -23,12 +24,17 @@ use crate::steps::{Outcome, Step};
 /// The counts of the volume stage that go with the slices: the range of the scan, and what is black and white.
 const INTENSITIES: [&str; 4] = ["intensity_min", "intensity_max", "intensity_black", "intensity_white"];
 /// The colours of the map, with what they are called.
-const COLORS: [(&str, &str, ColorBy); 4] = [
+const COLORS: [(&str, &str, ColorBy); 7] = [
     ("radius", "radius", ColorBy::Radius),
+    ("branch", "branch", ColorBy::Branch),
     ("generation", "generation", ColorBy::Generation),
+    (LABEL, LABEL, ColorBy::Label),
     ("angle-loss", "angle loss", ColorBy::AngleLoss),
     ("length-loss", "length loss", ColorBy::LengthLoss),
+    ("orientation-loss", "lost 3D orientation", ColorBy::OrientationLoss),
 ];
+/// The colours that only trees with labels have; their scale is a list of names.
+const LABEL: &str = "label";
 
 /// Makes the page.
 pub(crate) fn report(step: &mut Step<'_>) -> Result<Outcome, Error> {
@@ -63,6 +69,7 @@ pub(crate) fn report(step: &mut Step<'_>) -> Result<Outcome, Error> {
         generations: rows("generations.tsv")?,
         stenoses: rows("stenoses.tsv")?,
         dictionary: rows("dictionary.tsv")?,
+        space_png: if is_own { step.folder.checked_if_there("space.png")? } else { None },
         colorings: colorings(step, &tree, &embedding)?,
         stages: said,
         settings: listed(step, &stages),
@@ -115,12 +122,12 @@ fn is_result(file: &str) -> bool {
 }
 
 /// Whether tree and embedding are those of the folder.
-fn is_of_folder(artifacts: &Artifacts) -> bool {
+pub(crate) fn is_of_folder(artifacts: &Artifacts) -> bool {
     ![Artifact::Tree, Artifact::Embedding].iter().any(|artifact| artifacts.files.contains_key(artifact))
 }
 
 /// Whether there is a mask of this tree.
-fn has_mask(step: &Step<'_>) -> bool {
+pub(crate) fn has_mask(step: &Step<'_>) -> bool {
     let artifacts = &step.artifacts;
     let in_folder = || step.folder.path().join(Artifact::Mask.file()).exists();
     !step.is_traced()
@@ -198,8 +205,11 @@ fn listed(step: &Step<'_>, stages: &[Stage]) -> Vec<Setting> {
 
 /// The colours of the map on light and on dark pages, as in the pictures.
 fn colorings(step: &Step<'_>, tree: &Tree, embedding: &Embedding) -> Result<Vec<Coloring>, Error> {
+    let labels = labels::labels(step, tree)?;
+    let has_labels = labels.is_some() || tree.edges().any(|(node, _)| tree.nodes()[node].kind != 0);
     let table = |color_by, theme| -> Result<ColorTable, Error> {
-        let params = espalier_render::Params { color_by, theme, ..step.config.render.clone() };
+        let labels = labels.clone();
+        let params = espalier_render::Params { color_by, theme, labels, ..step.config.render.clone() };
         color_table(tree, embedding, &params).map_err(|error| step.failed(error))
     };
     let coloring = |(key, name, color_by): (&'static str, &str, ColorBy)| {
@@ -207,12 +217,12 @@ fn colorings(step: &Step<'_>, tree: &Tree, embedding: &Embedding) -> Result<Vec<
         Ok(Coloring {
             key,
             name: name.to_owned(),
-            caption: light.caption,
+            caption: if key == LABEL { String::new() } else { light.caption },
             light: light.colors,
             dark: dark.colors,
             bins: light.bins,
             ticks: light.ticks,
         })
     };
-    COLORS.into_iter().map(coloring).collect()
+    COLORS.into_iter().filter(|(key, ..)| *key != LABEL || has_labels).map(coloring).collect()
 }

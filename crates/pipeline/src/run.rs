@@ -85,8 +85,10 @@ fn run_stages(request: &Request, events: &(dyn Fn(Event) + Sync)) -> Result<Summ
     let patience = if request.wait { Patience::Wait(&say_so) } else { Patience::None };
     let mut folder = RunFolder::open_or_wait(&request.out, patience)?;
     folder.forget_unless(is_known);
-    failure::clear(&folder);
     let done = run.perform(&mut folder, &stages);
+    if done.is_ok() {
+        failure::clear(&folder);
+    }
     if let Err(error) = &done {
         folder.remove_if_unused();
         failure::write(&folder, error, run.input.as_deref());

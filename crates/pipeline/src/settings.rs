@@ -99,8 +99,8 @@ fn concerns(stage: Stage, key: &str) -> bool {
             table == "input" || key == "volume.orientation"
         }
         Stage::Views | Stage::Embed => table == "seed",
-        // The map may show the scan, which is read as the input says.
-        Stage::Render => matches!(table, "name" | "input"),
+        // The map may show the scan, which is read as the input says; the figure in space shows the mask.
+        Stage::Render => matches!(table, "name" | "input") || key == "volume.orientation",
     };
     is_shared || table == "schema" || table == stage.name()
 }

@@ -121,9 +121,10 @@ impl Stage {
     pub(crate) fn reads_beside(self) -> Vec<String> {
         match self {
             Self::Tree => [DROPPED_FILE, Artifact::Traced.file()].map(str::to_owned).into(),
-            // The scan only for a map that shows it.
+            // The scan only for a map that shows it; of the mask and of the labels of branches the organ beside the map.
             Self::Render => {
-                [Artifact::Comparison, Artifact::Volume].map(|read| read.file().to_owned()).into()
+                let read = [Artifact::Comparison, Artifact::Volume, Artifact::Mask].map(Artifact::file);
+                read.into_iter().chain(["branches.tsv"]).map(str::to_owned).collect()
             }
             Self::Report => {
                 let earlier = Self::ALL.into_iter().filter(|other| *other < self).flat_map(Self::writes);
@@ -192,6 +193,8 @@ impl Stage {
                 "/planar.pdf",
                 "/planar.exr",
                 "/global-view.png",
+                "/space.png",
+                "/space.svg",
                 "/compare.png",
                 "/compare.svg",
                 "/convergence.png",

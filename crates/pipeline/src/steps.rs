@@ -10,7 +10,7 @@ use espalier_model::{
     Comparison, Embedding, Grid, GridError, InscribedSpheres, Ledger, LedgerKind, Mask, MethodRow, Report,
     Termination, TracePoint, Tree, ViewHierarchy, nifti_out, swc,
 };
-use espalier_render::Style;
+use espalier_render::{ColorBy, SpaceSubject, Style};
 
 use crate::artifacts::{Artifacts, Lookup, SOURCE_KEY, SOURCE_SCAN, SOURCE_TRACING};
 use crate::compare::figure;
@@ -19,12 +19,14 @@ use crate::dictionary;
 use crate::error::Error;
 use crate::event::Event;
 use crate::folder::RunFolder;
+use crate::labels;
 use crate::methods::MethodWatch;
 use crate::page;
 use crate::phantom;
 use crate::provenance::PartCost;
 use crate::run::boxed;
 use crate::scan_of_map;
+use crate::space;
 use crate::stage::{Artifact, Stage};
 use crate::tree_outputs::{self, Made};
 
@@ -285,6 +287,7 @@ fn render(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let mut params = step.config.render.clone();
     params.title = params.title.or_else(|| step.config.own_name().map(str::to_owned));
     params.compass = figure::compass(params.compass, step.artifacts.is_of_scan);
+    params.labels = labels::labels(step, &tree)?;
     let (made, report) = if params.style == Style::Volume {
         let (scan, report) = scan_of_map::of_tree(step, &tree, &params)?;
         (espalier_render::render_scan((&tree, &embedding, &views), &scan, &params), report)
@@ -292,7 +295,7 @@ fn render(step: &mut Step<'_>) -> Result<Outcome, Error> {
         (espalier_render::render(&tree, &embedding, &views, &params), Report::default())
     };
     let made = made.map_err(|error| step.failed(error))?;
-    let report = Report { warnings: [report.warnings, made.report.warnings].concat(), ..made.report };
+    let mut report = Report { warnings: [report.warnings, made.report.warnings].concat(), ..made.report };
     let mut files = vec![
         ("planar.png".to_owned(), made.png),
         ("planar.svg".to_owned(), made.svg.into_bytes()),
@@ -304,12 +307,32 @@ fn render(step: &mut Step<'_>) -> Result<Outcome, Error> {
     if let Some(exr) = made.exr {
         files.push(("planar.exr".to_owned(), exr));
     }
+    if params.space {
+        let figure = space::figure(
+            step,
+            &SpaceSubject {
+                tree: &tree,
+                embedding: &embedding,
+                view: &views.global,
+                organ: None,
+                turn_deg: made.turn_deg,
+            },
+            &params,
+        )?;
+        files.extend(figure);
+    }
     if let Some(comparison) = comparison {
         let compass = params.compass;
         let subject =
             figure::Subject { name: None, tree: &tree, views: &views, comparison: &comparison, compass };
         files.extend(figure::draw(&[subject], &params).map_err(|error| step.failed(error))?);
         files.extend(figure::convergence(&comparison, &params).map_err(|error| step.failed(error))?);
+    }
+    let is_plain = || tree.edges().all(|(node, _)| tree.nodes()[node].kind == 0);
+    if params.color_by == ColorBy::Label && params.labels.is_none() && is_plain() {
+        let message =
+            "no branch has a label to be coloured by: name a label map, such as lobes, in tree.labels";
+        report.warn("W-RENDER-LABEL", message.to_owned());
     }
     let line = files.iter().map(|(file, _)| file.as_str()).collect::<Vec<_>>().join(", ");
     Ok(Outcome { files, report, line })

@@ -44,9 +44,10 @@ pub(crate) fn files(
         let values = espalier_tree::branch_voxels(mask, made.tree);
         count_voxels(&mut anatomy, mask, &values, report);
         files.push(("branches.nii.gz", nifti_out::labels(mask, &values).map_err(failed)?));
-        let n_branches = anatomy.branches.len();
-        files.push(("branches.ctbl", label_table::slicer_colors(n_branches).into_bytes()));
-        files.push(("branches.label.txt", label_table::snap_labels(n_branches).into_bytes()));
+        // The colours of the pictures.
+        let colors = espalier_render::branch_colors(made.tree);
+        files.push(("branches.ctbl", label_table::slicer_colors(&colors).into_bytes()));
+        files.push(("branches.label.txt", label_table::snap_labels(&colors).into_bytes()));
     }
     describe(&anatomy, made, report);
     let texts = [

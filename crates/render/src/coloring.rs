@@ -12,6 +12,7 @@
 use espalier_geom::{angle, math};
 use espalier_model::{Branch, Branches, Embedding, Tree};
 
+use crate::branch_names;
 use crate::orientation::Orientation;
 use crate::palette::Palette;
 use crate::params::{ColorBy, Params};
@@ -24,6 +25,8 @@ const SHARE_IN_SCALE: f64 = 0.98;
 const HALF_RANGE: [f64; 2] = [0.25, 2.0];
 /// More generations than this run into each other and are drawn as a continuous bar.
 const MAX_STEPS: usize = 10;
+/// Letters of a label's name at most.
+const MAX_NAME: usize = 28;
 /// Ticks closer than this to a more important one are left out, as a share of the bar.
 const TICK_GAP: f64 = 0.09;
 
@@ -43,7 +46,7 @@ pub(crate) struct Tick {
 pub(crate) struct Scale {
     /// What is coloured, with its unit.
     pub caption: String,
-    /// The marks, from the bottom up.
+    /// The marks, from the bottom up; of names in the order in which they are read.
     pub ticks: Vec<Tick>,
 }
 
@@ -68,7 +71,7 @@ pub(crate) fn color(
 ) -> Coloring {
     match params.color_by {
         ColorBy::Part => parts::color(tree, branches, params.theme),
-        ColorBy::Label => by_label(tree),
+        ColorBy::Label => by_label(tree, branches, params),
         ColorBy::OrientationLoss => {
             by_loss("lost orientation (°)", (tree, params), |node| orientation.loss_deg[node])
         }
@@ -228,21 +231,10 @@ fn by_generation(tree: &Tree, branches: &Branches, params: &Params) -> Coloring 
     Coloring { palette, ends, scale: Some(linear_scale("generation", ticks)) }
 }
 
-/// Each branch takes the first colour that neither its parent nor a sibling before it has.
+/// One colour a branch, see [`crate::branch_names`].
 fn by_branch(tree: &Tree, branches: &Branches) -> Coloring {
     let palette = Palette::names();
-    let list = branches.list();
-    let mut names: Vec<usize> = Vec::with_capacity(list.len());
-    let mut last_at_hub = vec![None; tree.n_nodes()];
-    for (branch_idx, branch) in list.iter().enumerate() {
-        let taken = [branch.parent.map(|parent| names[parent]), last_at_hub[branch.hub]];
-        let free = (0..palette.len())
-            .map(|step| (branch_idx + step) % palette.len())
-            .find(|&name| !taken.contains(&Some(name)))
-            .unwrap_or(0);
-        names.push(free);
-        last_at_hub[branch.hub] = Some(free);
-    }
+    let names = branch_names::names(branches, palette.len());
     let root_name = names.first().copied().unwrap_or(0);
     let ends = (0..tree.n_nodes())
         .map(|node| [palette.value_of(branches.of_node(node).map_or(root_name, |branch| names[branch])); 2])
@@ -250,8 +242,44 @@ fn by_branch(tree: &Tree, branches: &Branches) -> Coloring {
     Coloring { palette, ends, scale: None }
 }
 
+/// The labels that the caller knows, the first on top of the scale and what has none at its foot; else one colour for
+/// each kind that the nodes have.
+fn by_label(tree: &Tree, branches: &Branches, params: &Params) -> Coloring {
+    let Some(labels) =
+        params.labels.as_ref().filter(|labels| labels.of_branch.len() == branches.list().len())
+    else {
+        return by_kind(tree);
+    };
+    let n_names = labels.entries.len();
+    let colors = labels.entries.iter().map(|entry| entry.color).rev();
+    let palette = Palette::labels(colors, params.theme);
+    // The first entry is the last of the palette, whose first is grey.
+    let value_of =
+        |label: Option<usize>| palette.value_of(label.map_or(0, |label| n_names - label.min(n_names)));
+    let label_of = |node: usize| branches.of_node(node).or((!labels.of_branch.is_empty()).then_some(0));
+    let label_of = |node: usize| label_of(node).and_then(|branch| labels.of_branch[branch]);
+    let ends: Vec<[f32; 2]> = (0..tree.n_nodes()).map(|node| [value_of(label_of(node)); 2]).collect();
+    let tick = |label: Option<usize>, text: &str| Tick {
+        position: f64::from(value_of(label)),
+        text: text.to_owned(),
+        is_mean: false,
+    };
+    let mut ticks: Vec<Tick> =
+        labels.entries.iter().enumerate().map(|(i, entry)| tick(Some(i), &shortened(&entry.name))).collect();
+    ticks.push(tick(None, "no label"));
+    Coloring { palette, ends, scale: Some(Scale { caption: "label".to_owned(), ticks }) }
+}
+
+/// A name that leaves room for the tree.
+fn shortened(name: &str) -> String {
+    if name.chars().count() <= MAX_NAME {
+        return name.to_owned();
+    }
+    name.chars().take(MAX_NAME - 1).chain(['…']).collect()
+}
+
 /// One colour for each label that the nodes have, in ascending order.
-fn by_label(tree: &Tree) -> Coloring {
+fn by_kind(tree: &Tree) -> Coloring {
     let kinds: std::collections::BTreeSet<i32> =
         tree.edges().map(|(node, _)| tree.nodes()[node].kind).collect();
     let kinds: Vec<i32> = kinds.into_iter().collect();
@@ -259,10 +287,8 @@ fn by_label(tree: &Tree) -> Coloring {
     let value_of = |kind: i32| palette.value_of(kinds.binary_search(&kind).unwrap_or(0));
     let ends = tree.nodes().iter().map(|node| [value_of(node.kind); 2]).collect();
     let tick = |&kind: &i32| Tick { position: f64::from(value_of(kind)), text: label(kind), is_mean: false };
-    // More labels than fit beside the bar: the colours alone tell them apart.
-    let scale = (kinds.len() <= MAX_STEPS)
-        .then(|| Scale { caption: "label".to_owned(), ticks: kinds.iter().map(tick).collect() });
-    Coloring { palette, ends, scale }
+    let scale = Scale { caption: "label".to_owned(), ticks: kinds.iter().map(tick).collect() };
+    Coloring { palette, ends, scale: Some(scale) }
 }
 
 /// The structures of the SWC format by their numbers.

@@ -7,10 +7,10 @@
 use espalier_model::Tree;
 use glam::{DVec2, DVec3};
 
-use crate::coloring::{Coloring, Scale};
+use crate::coloring::{Coloring, Scale, Tick};
 use crate::drawing::{Group, Mark};
 use crate::page::Page;
-use crate::palette::PageColors;
+use crate::palette::{PageColors, Palette};
 use crate::params::{Compass, Params};
 use crate::scene::Scene;
 use crate::text::{Anchor, Face};
@@ -24,6 +24,8 @@ const SMALL: f64 = 1.2;
 const LEADING: f64 = 1.4;
 /// Size of the colour bar in layout units.
 const BAR: DVec2 = DVec2::new(1.4, 15.0);
+/// Names beside the colour bar; what is more is counted.
+const MAX_NAMES: usize = 12;
 /// Height of the scale bar with its text, and its largest length.
 const SCALE_BAR: DVec2 = DVec2::new(11.0, 3.4);
 
@@ -65,7 +67,7 @@ pub(crate) fn heading(face: &Face, said: &Heading, width: u32, colors: &PageColo
 /// The size of the key in pixels.
 pub(crate) fn key_size(face: &Face, coloring: &Coloring, width: u32) -> DVec2 {
     let unit = Page::unit_px(width);
-    let bar = shown_scale(coloring, width).map_or(DVec2::ZERO, |scale| {
+    let bar = shown_scale(coloring, width).map_or(DVec2::ZERO, |(_, scale)| {
         let texts = scale.ticks.iter().map(|tick| face.width(&tick.text, (SMALL * unit) as f32));
         let caption = f64::from(face.width(&scale.caption, (BODY * unit) as f32));
         let ticks = BAR.x * unit + unit + f64::from(texts.fold(0.0, f32::max));
@@ -79,20 +81,35 @@ pub(crate) fn key(page: &Page, coloring: &Coloring, params: &Params, colors: &Pa
     let unit = page.unit_px;
     let mut groups = Vec::new();
     let mut at = page.key_at;
-    if let Some(scale) = shown_scale(coloring, page.width) {
-        groups.push(color_bar(at, unit, coloring, scale, colors));
+    if let Some((palette, scale)) = shown_scale(coloring, page.width) {
+        groups.push(color_bar(at, unit, (palette, &scale), colors));
         at.y += (BAR.y + 3.4) * unit;
     }
     groups.extend(scale_bar(page, at, params, colors));
     groups
 }
 
-/// The scale, if the page has room for it.
-fn shown_scale(coloring: &Coloring, width: u32) -> Option<&Scale> {
-    coloring.scale.as_ref().filter(|_| !Page::is_thumbnail(width))
+/// The scale with its colours, if the page has room for it; of many names the first.
+fn shown_scale(coloring: &Coloring, width: u32) -> Option<(Palette, Scale)> {
+    let scale = coloring.scale.as_ref().filter(|_| !Page::is_thumbnail(width))?;
+    let n_names = scale.ticks.len();
+    if coloring.palette.is_continuous || n_names <= MAX_NAMES {
+        return Some((coloring.palette.clone(), scale.clone()));
+    }
+    let is_from_top = scale.ticks[0].position > scale.ticks[n_names - 1].position;
+    let share = MAX_NAMES as f64 / coloring.palette.len() as f64;
+    let (palette, low) = if is_from_top {
+        (coloring.palette.last(MAX_NAMES), 1.0 - share)
+    } else {
+        (coloring.palette.first(MAX_NAMES), 0.0)
+    };
+    let placed = |tick: &Tick| Tick { position: (tick.position - low) / share, ..tick.clone() };
+    let ticks = scale.ticks.iter().take(MAX_NAMES).map(placed).collect();
+    let caption = format!("{}, … and {} more", scale.caption, n_names - MAX_NAMES);
+    Some((palette, Scale { caption, ticks }))
 }
 
-fn color_bar(at: DVec2, unit: f64, coloring: &Coloring, scale: &Scale, colors: &PageColors) -> Group {
+fn color_bar(at: DVec2, unit: f64, (palette, scale): (Palette, &Scale), colors: &PageColors) -> Group {
     let text = |at: DVec2, size: f64, is_strong: bool, text: &str| Mark::Text {
         at,
         size_px: size * unit,
@@ -105,7 +122,7 @@ fn color_bar(at: DVec2, unit: f64, coloring: &Coloring, scale: &Scale, colors: &
     let size = BAR * unit;
     let mut marks = vec![
         text(at + DVec2::new(0.0, BODY * unit), BODY, false, &scale.caption),
-        Mark::Bar { corner, size, palette: coloring.palette.clone() },
+        Mark::Bar { corner, size, palette },
     ];
     for (from, to) in
         [(DVec2::ZERO, DVec2::X), (DVec2::X, DVec2::ONE), (DVec2::ONE, DVec2::Y), (DVec2::Y, DVec2::ZERO)]

@@ -99,7 +99,7 @@ impl Map<'_> {
     }
 
     /// Middles of boxes of this size beside a branch, the best place first.
-    fn places(&self, branch: usize, size: DVec2) -> Vec<DVec2> {
+    pub(crate) fn places(&self, branch: usize, size: DVec2) -> Vec<DVec2> {
         let nodes: Vec<usize> = self.branches.list()[branch].polyline().collect();
         let mut places = Vec::new();
         for share in [0.5, 0.35, 0.65, 0.8] {
@@ -122,7 +122,7 @@ impl Map<'_> {
     }
 
     /// Takes the cells under the branches.
-    fn take_branches(&self, grid: &mut Grid) {
+    pub(crate) fn take_branches(&self, grid: &mut Grid) {
         for (node, parent) in self.tree.edges() {
             let [a, b] = [parent, node].map(|n| self.page.px(self.scene.points_mm[n].truncate()));
             let radius_px = self.page.radius_px(self.scene.radii_mm[node].max(self.scene.radii_mm[parent]));
@@ -136,14 +136,14 @@ impl Map<'_> {
 }
 
 /// Which cells of a page are taken.
-struct Grid {
+pub(crate) struct Grid {
     cell_px: f64,
     size: [usize; 2],
     is_taken: Vec<bool>,
 }
 
 impl Grid {
-    fn new(page: &Page) -> Self {
+    pub(crate) fn new(page: &Page) -> Self {
         let cell_px = 0.35 * page.unit_px;
         let size = [page.width, page.height].map(|pixels| (f64::from(pixels) / cell_px) as usize + 1);
         Self { cell_px, size, is_taken: vec![false; size[0] * size[1]] }
@@ -158,13 +158,13 @@ impl Grid {
         rows.flat_map(move |row| columns.clone().map(move |column| row * n_x + column))
     }
 
-    fn take(&mut self, low: DVec2, high: DVec2) {
+    pub(crate) fn take(&mut self, low: DVec2, high: DVec2) {
         for cell in self.cells(low, high) {
             self.is_taken[cell] = true;
         }
     }
 
-    fn is_free(&self, center: DVec2, size: DVec2) -> bool {
+    pub(crate) fn is_free(&self, center: DVec2, size: DVec2) -> bool {
         let (low, high) = (center - 0.5 * size, center + 0.5 * size);
         let page = DVec2::new(self.size[0] as f64, self.size[1] as f64) * self.cell_px;
         let is_inside = low.cmpge(DVec2::ZERO).all() && high.cmplt(page).all();

@@ -4,14 +4,14 @@
 //! |--:|---|---|
 //! | 0 | `map` | what each point of the plane stands for in the patient |
 //! | 1 | `scene` | nodes in picture space: the map, or the global view |
-//! | 2 | `coloring`, `palette`, `unit`, `color_table` | a value for each end of each edge, its colour, its scale |
+//! | 2 | `coloring`, `branch_names`, `palette`, `unit`, `color_table` | a value for each end of each edge, its colour, its scale |
 //! | 3 | `heading`, `furniture`, `text` | what stands beside the tree, and how much room it needs |
 //! | 4 | `page` | scale and places |
 //! | 5 | `sketch`, `cone`, `kinship` | edges as round cones in pixels |
 //! | 6 | `raster`, `tiles`, `samples`, `shade` | the pixels |
 //! | 7 | `reformation` | the pixels of a scan along the map, in place of 5 and 6 |
 //! | 8 | `paint`, `svg`, `outline`, `layers` | the files |
-//! | 9 | `side_by_side`, `tiling`, `parts`; `juxtaposed`; `chart`, `convergence`, `profile`; `thumbnail` | several layouts in one figure; two trees on one map; charts of numbers; a map among many |
+//! | 9 | `side_by_side`, `tiling`, `parts`; `space`; `juxtaposed`; `chart`, `convergence`, `profile`; `thumbnail` | several layouts in one figure; the organ in space beside its map; two trees on one map; charts of numbers; a map among many |
 //!
 //! **Source** section 4.1 of [Hu2022].
 
@@ -21,6 +21,7 @@ mod map;
 
 mod scene;
 
+mod branch_names;
 mod color_table;
 mod coloring;
 mod orientation;
@@ -59,6 +60,7 @@ mod juxtaposed;
 mod parts;
 mod profile;
 mod side_by_side;
+mod space;
 mod thumbnail;
 mod tiling;
 
@@ -67,6 +69,7 @@ mod error;
 use espalier_model::{Branches, Embedding, Report, Tree, ViewHierarchy, Volume};
 use glam::DVec3;
 
+pub use branch_names::branch_colors;
 pub use chart::{Chart, Charts, charts};
 pub use color_table::{ColorTable, color_table};
 use coloring::Coloring;
@@ -81,13 +84,14 @@ use orientation::Orientation;
 use page::{Needs, Page, Paper, Pen};
 use paint::Canvas;
 use palette::PageColors;
-pub use params::{ColorBy, Compass, Fit, Params, Style, Theme, Unit};
+pub use params::{ColorBy, Compass, Fit, LabelEntry, Labels, Params, SpaceView, Style, Theme, Unit};
 pub use profile::{Stretch, Way, profile};
 use raster::{Drawn, Job, Pixel, Raster};
 pub use reformation::params::{Slab, VolumeParams, Window};
 use reformation::{Reformation, Tally};
 use scene::Scene;
 pub use side_by_side::{Panel, Section, SideBySide, side_by_side};
+pub use space::{Organ, Subject as SpaceSubject, space};
 use text::Face;
 pub use thumbnail::{Thumbnail, thumbnail};
 
@@ -104,6 +108,8 @@ pub struct Rendered {
     pub exr: Option<Vec<u8>>,
     /// The tree in space from the global view as PNG, in the same colours.
     pub global_view_png: Vec<u8>,
+    /// By how many degrees the map was turned counter-clockwise to fit its page.
+    pub turn_deg: u32,
     /// Sizes and scales.
     pub report: Report,
 }
@@ -237,6 +243,7 @@ fn draw_all(
         pdf: pdf.transpose()?,
         exr: layers.as_ref().map(|layers| layers.file(blocks)).transpose()?,
         global_view_png: artist.draw(&global, |_, _| ())?.png,
+        turn_deg: flat.scene.turn_deg,
         report,
     })
 }

@@ -77,6 +77,17 @@ impl Canvas {
         bands.map_init(brush, paint).collect()
     }
 
+    /// Lays pixels, rows of a width, with their upper left corner at a pixel.
+    pub(crate) fn lay(&mut self, pixels: &[Pixel], width: usize, [left, top]: [usize; 2]) {
+        let stride = 4 * self.pixmap.width() as usize;
+        let rows = self.pixmap.data_mut().get_mut(top * stride..).unwrap_or_default();
+        for (line, row) in pixels.chunks(width.max(1)).zip(rows.chunks_mut(stride)) {
+            line.iter()
+                .zip(row.chunks_exact_mut(4).skip(left))
+                .for_each(|(pixel, target)| put(pixel, target));
+        }
+    }
+
     /// Draws marks over everything.
     pub(crate) fn mark(&mut self, groups: &[Group], face: &Face) {
         for mark in groups.iter().flat_map(|group| &group.marks) {

@@ -110,6 +110,22 @@ impl Palette {
         Self { table, is_continuous: false }
     }
 
+    /// Grey, then the colours of labels; those that have none take colours for names in turn.
+    pub(crate) fn labels(colors: impl Iterator<Item = Option<[u8; 3]>>, theme: Theme) -> Self {
+        let parts = Self::parts(theme);
+        let own = |(i, color): (usize, Option<[u8; 3]>)| {
+            color.map_or(rgb(NAMES[i % NAMES.len()]), |color| color.map(|part| f32::from(part) / 255.0))
+        };
+        let table = parts.table.into_iter().take(1).chain(colors.enumerate().map(own)).collect();
+        Self { table, is_continuous: false }
+    }
+
+    /// The last `n` colours.
+    pub(crate) fn last(&self, n: usize) -> Self {
+        let table = self.table[self.len().saturating_sub(n.max(1))..].to_vec();
+        Self { table, is_continuous: false }
+    }
+
     /// The same colours in `n` flat steps.
     pub(crate) fn in_steps(&self, n: usize) -> Self {
         let position = |i: usize| if n > 1 { i as f32 / (n - 1) as f32 } else { 0.5 };
@@ -130,6 +146,11 @@ impl Palette {
             })
             .collect();
         Self { table, is_continuous: true }
+    }
+
+    /// The colour at a value alone.
+    pub(crate) fn only(&self, value: f32) -> Self {
+        Self { table: vec![self.at(value)], is_continuous: false }
     }
 
     /// How many colours it has.

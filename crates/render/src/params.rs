@@ -62,9 +62,24 @@ pub enum ColorBy {
     OrientationLoss,
     /// The main subtrees, each in a colour of its own, as in the comparison of methods.
     Part,
-    /// The label of each node: the structure of a traced tree (soma, axon, dendrite, …); one colour where a tree has
-    /// none.
+    /// The label of each branch, such as its lobe, in the colours of the table of names; of a traced tree without a
+    /// label map the structure of each node (soma, axon, dendrite, …). Grey is what has none.
     Label,
+}
+
+/// Where the organ in space is seen from, in the figure of it beside the map.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SpaceView {
+    /// The global view, from which least of the tree is hidden or shortened.
+    #[default]
+    Global,
+    /// From the front: the patient's right is on the left.
+    Coronal,
+    /// From the left: the front is on the left.
+    Sagittal,
+    /// From the feet, as slices are hung: the patient's right is on the left.
+    Axial,
 }
 
 /// How the tree lies on its page.
@@ -112,6 +127,24 @@ pub enum Compass {
     None,
 }
 
+/// Labels of branches, such as lobes, to colour them by.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Labels {
+    /// The labels, in the order of the legend.
+    pub entries: Vec<LabelEntry>,
+    /// By branch: the index of its label.
+    pub of_branch: Vec<Option<usize>>,
+}
+
+/// A label.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LabelEntry {
+    /// What it is called.
+    pub name: String,
+    /// Its colour, sRGB; without one it takes one of those for names.
+    pub color: Option<[u8; 3]>,
+}
+
 /// The parameters of the pictures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -146,12 +179,20 @@ pub struct Params {
     /// Height of the map's page over its width, 0.2 to 5, such as 0.5625 for a slide or 1.414 for a sheet of paper.
     /// None by default: the page takes the tree's shape within 0.4 to 1.4.
     pub aspect: Option<f64>,
+    /// Whether to make the figure of the organ in space beside the map. Default true.
+    pub space: bool,
+    /// Where that figure sees the organ from. Default the global view; one of the three planes of the body for
+    /// comparison with slices.
+    pub space_view: SpaceView,
     /// Whether to make the PDF, 300 pixels to an inch. Default true.
     pub pdf: bool,
     /// Whether to make the EXR with its layers. Default true; it is the largest of the files.
     pub exr: bool,
     /// `[render.volume]`: the scan on the map, for `style = "volume"`.
     pub volume: VolumeParams,
+    /// The labels of the branches, of which the caller knows: no setting.
+    #[serde(skip)]
+    pub labels: Option<Labels>,
 }
 
 impl Default for Params {
@@ -168,9 +209,12 @@ impl Default for Params {
             compass: Compass::Auto,
             fit: Fit::Upright,
             aspect: None,
+            space: true,
+            space_view: SpaceView::Global,
             pdf: true,
             exr: true,
             volume: VolumeParams::default(),
+            labels: None,
         }
     }
 }

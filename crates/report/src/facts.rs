@@ -114,6 +114,8 @@ pub struct Facts<'a> {
     pub stenoses: Option<Rows>,
     /// `dictionary.tsv`.
     pub dictionary: Option<Rows>,
+    /// The figure of the organ in space beside its map, as PNG.
+    pub space_png: Option<Vec<u8>>,
     /// The colours of the map; the first is shown first.
     pub colorings: Vec<Coloring>,
     /// What each stage said, in their order.

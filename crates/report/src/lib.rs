@@ -38,6 +38,7 @@ mod plots;
 mod profile;
 mod projections;
 mod provenance;
+mod space;
 mod verdict;
 mod worst;
 

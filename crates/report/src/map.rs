@@ -17,7 +17,8 @@ use crate::facts::{Coloring, Facts};
 use crate::layout::{Frame, bounds};
 use crate::length::{Unit, number};
 use crate::losses;
-use crate::page::{absent, data_block};
+use crate::page::{absent, data_block, png_address};
+use crate::space;
 use crate::strokes::{self, Budget, Piece, Subject, path};
 use crate::worst::{Worst, worst};
 
@@ -25,6 +26,8 @@ use crate::worst::{Worst, worst};
 const BUDGET: Budget = Budget { pieces: 9_000, points: 100_000 };
 /// Branches with values of their own: some 80 bytes each.
 const MAX_BRANCHES: usize = 8_000;
+/// Names in a legend; what is more is counted.
+const MAX_NAMES: usize = 24;
 /// The share of the width that a scale bar takes at most.
 const BAR_SHARE: f64 = 0.2;
 
@@ -52,7 +55,7 @@ pub(crate) fn body(facts: &Facts<'_>) -> Markup {
     html! {
         p.note {
             "A map, not a projection: it keeps lengths, bends and calibres, not directions. "
-            span.with-script { "Drag to move, the wheel with Ctrl or the buttons to zoom; rest on a branch for its values, click a tip for its calibre below. " }
+            span.with-script { "Drag to move, the wheel with Ctrl or the buttons to zoom; rest on a branch for its values and to see it below in space, click a tip for its calibre below. " }
             @if n_own < is_own.len() {
                 "The " (n_own) " longest of " (is_own.len()) " branches have values and colours of their own here; branches.tsv has all."
             }
@@ -77,9 +80,24 @@ pub(crate) fn body(facts: &Facts<'_>) -> Markup {
                     (worst_marks(&found, facts, &frame))
                 }
             }
+            (space::body(facts, (&branches, &is_own), &colorings))
+        }
+        @if let Some((png, [width, height])) = facts.space_png.as_ref().and_then(|png| Some((png, size_px(png)?))) {
+            figure.print {
+                svg viewBox={ "0 0 " (width) " " (height) } role="img" aria-label="the organ in space, its centreline and the map, a colour for each branch" {
+                    image href=(png_address(png)) width=(width) height=(height) {}
+                }
+                figcaption { "The organ in space and on the plane: same colour and same number, same branch." }
+            }
         }
         (data_block("map-data", &values(facts, &branches, &is_own)))
     }
+}
+
+/// Width and height of a PNG, from its header.
+fn size_px(png: &[u8]) -> Option<[u32; 2]> {
+    let part = |first: usize| png.get(first..first + 4)?.try_into().ok().map(u32::from_be_bytes);
+    Some([part(16)?, part(20)?])
 }
 
 /// Which branches have values of their own: the longest.
@@ -97,7 +115,7 @@ fn with_values(facts: &Facts<'_>, branches: &Branches) -> Vec<bool> {
 }
 
 /// The letter of a colouring in the names of its colours.
-fn letter(index: usize) -> char {
+pub(crate) fn letter(index: usize) -> char {
     (b'a' + (index % 26) as u8) as char
 }
 
@@ -133,9 +151,12 @@ fn scale(index: usize, coloring: &Coloring) -> Markup {
 fn names(index: usize, coloring: &Coloring) -> Markup {
     html! {
         ul.legend {
-            @for (bin, (_, name)) in coloring.ticks.iter().enumerate() {
+            @if coloring.ticks.is_empty() { li { "a colour for each branch, other than its parent's and its siblings'" } }
+            @for (place, name) in coloring.ticks.iter().take(MAX_NAMES) {
+                @let bin = (place * coloring.light.len() as f64) as usize;
                 li { svg.mark viewBox="0 0 20 20" aria-hidden="true" { rect.(format!("{}{bin}", letter(index))) width="20" height="20" {} } (name) }
             }
+            @if coloring.ticks.len() > MAX_NAMES { li { "… and " (coloring.ticks.len() - MAX_NAMES) " more" } }
         }
     }
 }
@@ -188,7 +209,7 @@ fn tubes(pieces: &[Piece], is_own: &[bool]) -> Markup {
     }
     html! {
         use.rim href="#tubes" {}
-        g #tubes { (PreEscaped(out)) }
+        g #tubes.tubes { (PreEscaped(out)) }
     }
 }
 

@@ -167,6 +167,7 @@ impl Run {
             )),
             stenoses: Some(Rows::parse("candidate\tbranch\n0\t0\n")),
             dictionary: Some(Rows::parse("table\tcolumn\tunit\tmeaning\na.tsv\tb\tmm\tc\n")),
+            space_png: Some(vec![1; 24]),
             colorings: vec![coloring("radius", "radius"), coloring("angle-loss", "angle loss")],
             input_files: vec![InputFile {
                 role: "input".to_owned(),
@@ -206,6 +207,7 @@ impl Run {
             generations: None,
             stenoses: None,
             dictionary: None,
+            space_png: None,
             colorings: Vec::new(),
             stages: Vec::new(),
             settings: Vec::new(),

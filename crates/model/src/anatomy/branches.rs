@@ -12,6 +12,8 @@ pub struct Region {
     pub label: i64,
     /// Its name; the value's digits where nobody has named it.
     pub name: String,
+    /// Its colour, sRGB; none where nobody has given it one.
+    pub color: Option<[u8; 3]>,
     /// How much of the branch's length lies in it, 0 to 1; 0 where it is only the nearest.
     pub share: f64,
 }
@@ -130,10 +132,14 @@ const fn measure(
     Measure { column: Column::new(name, unit, meaning), of }
 }
 
+fn hex([red, green, blue]: [u8; 3]) -> String {
+    format!("#{red:02x}{green:02x}{blue:02x}")
+}
+
 use MeasureValue::{Number, Text, Whole};
 
 #[rustfmt::skip]
-const MEASURES: [Measure; 33] = [
+const MEASURES: [Measure; 34] = [
     measure("branch", "n/a", "index of the branch, the same in every file; its voxels in branches.nii.gz have this value plus 1",
         |b| Whole(Some(b.branch))),
     measure("parent", "n/a", "the branch that it hangs from; n/a at the root", |b| Whole(b.parent)),
@@ -172,6 +178,8 @@ const MEASURES: [Measure; 33] = [
         |b| Text(b.region.as_ref().map(|region| region.label.to_string()).unwrap_or_default())),
     measure("label_name", "n/a", "name of that label (tree.label_names)",
         |b| Text(b.region.as_ref().map(|region| region.name.clone()).unwrap_or_default())),
+    measure("label_color", "n/a", "colour of that label (tree.label_names), #rrggbb",
+        |b| Text(b.region.as_ref().and_then(|region| region.color).map(hex).unwrap_or_default())),
     measure("label_share", "1", "share of its length that lies in that label; 0 if the label is only the nearest",
         |b| Number(b.region.as_ref().map_or(f64::NAN, |region| region.share))),
     measure("mask_voxels", "voxel", "voxels of the mask that are its own in branches.nii.gz", |b| Whole(b.n_voxels)),

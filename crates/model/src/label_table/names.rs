@@ -21,7 +21,7 @@ use crate::FileError;
 
 const FORMAT: &str = "label names";
 /// What the column of values is called, in lower case.
-const VALUE_COLUMNS: [&str; 4] = ["index", "labelvalue", "value", "label"];
+pub(super) const VALUE_COLUMNS: [&str; 4] = ["index", "labelvalue", "value", "label"];
 /// What the column of names is called, in lower case.
 const NAME_COLUMNS: [&str; 3] = ["name", "label_name", "structure"];
 
@@ -100,7 +100,7 @@ impl Columns {
     }
 }
 
-fn cells(line: &str, separator: char) -> impl Iterator<Item = &str> {
+pub(super) fn cells(line: &str, separator: char) -> impl Iterator<Item = &str> {
     line.split(separator).map(|cell| cell.trim().trim_matches('"'))
 }
 
@@ -166,10 +166,10 @@ mod tests {
 
     #[test]
     fn our_own_tables_read_back() {
-        let names = parse_names(&slicer_colors(3)).expect("a colour table");
+        let names = parse_names(&slicer_colors(&[[9, 8, 7]; 3])).expect("a colour table");
         assert_eq!(names.get(&3).map(String::as_str), Some("branch_2"));
         assert_eq!(
-            parse_names(&snap_labels(2)).expect("labels").get(&2).map(String::as_str),
+            parse_names(&snap_labels(&[[9, 8, 7]; 2])).expect("labels").get(&2).map(String::as_str),
             Some("branch 1")
         );
     }

@@ -8,7 +8,10 @@
   const valuesOf = new Map(data.rows.map((row) => [row[0], row]));
   const isTip = (branch) => valuesOf.has(branch) && valuesOf.get(branch)[8] === 1;
   const piecesOf = new Map();
-  for (const piece of svg.querySelectorAll("[data-b]")) {
+  // The map and the tree in space: a branch is lit in both.
+  const space = document.getElementById("space-svg");
+  const pictures = space ? [svg, space] : [svg];
+  for (const piece of pictures.flatMap((picture) => [...picture.querySelectorAll("[data-b]")])) {
     const branch = Number(piece.dataset.b);
     if (!piecesOf.has(branch)) piecesOf.set(branch, []);
     piecesOf.get(branch).push(piece);
@@ -98,7 +101,7 @@
   let lit = null;
   const branchOf = (event) => {
     const piece = event.target instanceof Element ? event.target.closest("[data-b]") : null;
-    return piece && svg.contains(piece) ? Number(piece.dataset.b) : null;
+    return piece && pictures.some((picture) => picture.contains(piece)) ? Number(piece.dataset.b) : null;
   };
   function light(branch) {
     if (branch === lit) return;
@@ -131,13 +134,15 @@
     const below = event.clientY + 16;
     tip.style.top = `${below + height > innerHeight ? Math.max(4, event.clientY - height - 12) : below}px`;
   }
-  svg.addEventListener("pointermove", (event) => {
-    if (drag && drag.moved) return;
-    const branch = branchOf(event);
-    if (branch === null) hide();
-    else tell(branch, event);
-  });
-  svg.addEventListener("pointerleave", hide);
+  for (const picture of pictures) {
+    picture.addEventListener("pointermove", (event) => {
+      if (drag && drag.moved) return;
+      const branch = branchOf(event);
+      if (branch === null) hide();
+      else tell(branch, event);
+    });
+    picture.addEventListener("pointerleave", hide);
+  }
 
   function choose(branch) {
     if (isTip(branch)) document.dispatchEvent(new CustomEvent("tip-chosen", { detail: branch }));

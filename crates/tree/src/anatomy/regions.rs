@@ -29,6 +29,8 @@ pub struct LabelMap {
     pub volume: Volume,
     /// Names of labels.
     pub names: BTreeMap<i64, String>,
+    /// Colours of labels, sRGB.
+    pub colors: BTreeMap<i64, [u8; 3]>,
     /// How far from a branch the nearest label may be, in mm.
     pub reach_mm: f64,
 }
@@ -54,7 +56,7 @@ impl LabelMap {
 
     fn region(&self, label: i64, share: f64) -> Region {
         let name = self.names.get(&label).cloned().unwrap_or_else(|| label.to_string());
-        Region { label, name, share }
+        Region { label, name, color: self.colors.get(&label).copied(), share }
     }
 
     fn label_at(&self, point_mm: DVec3) -> Option<i64> {

@@ -210,12 +210,17 @@ fn labels_by_majority_else_by_nearness() {
     let values = (0..grid.n_voxels()).map(|index| if grid.voxel(index)[2] < 10 { 7 } else { 9 }).collect();
     let array = ndarray::Array3::from_shape_vec((20, 10, 10), values).expect("an array");
     let names = BTreeMap::from([(7, "lower".to_owned())]);
-    let map = LabelMap { volume: Volume::new(grid, Voxels::U8(array), 1.0, 0.0), names, reach_mm: 5.0 };
+    let map = LabelMap {
+        volume: Volume::new(grid, Voxels::U8(array), 1.0, 0.0),
+        names,
+        colors: BTreeMap::from([(7, [1, 2, 3])]),
+        reach_mm: 5.0,
+    };
     let context = MeasureContext { labels: Some(&map), ..plain() };
     let region = |from: [f64; 3], to: [f64; 3]| {
         measure(&tree(&[node(from, 1.0, None), node(to, 1.0, Some(0))]), &context).branches[0].region.clone()
     };
-    let lower = |share| Some(Region { label: 7, name: "lower".to_owned(), share });
+    let lower = |share| Some(Region { label: 7, name: "lower".to_owned(), color: Some([1, 2, 3]), share });
     assert_eq!(region([0.0, 0.0, 12.0], [0.0, 0.0, 22.0]), lower(0.8));
     assert_eq!(
         region([0.0, 0.0, 18.0], [0.0, 0.0, 38.0]).map(|r| (r.label, r.name)),
