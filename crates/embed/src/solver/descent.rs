@@ -55,11 +55,17 @@ pub(crate) fn descend_within<'a>(
     let mut descent = Descent::new(problem, linkage, window.clone());
     let mut energy = descent.energy();
     while !work.is_spent() && descent.loss() > LEAST_LOSS {
-        let before = descent.linkage.shape.clone();
+        // Nothing of the size of the whole tree where only a subtree counts: there energies fall at each change.
+        let before = descent.linkage.placement.is_some().then(|| descent.linkage.shape.clone());
         descent.sweep(work);
-        descent.linkage.refresh();
+        if before.is_some() {
+            work.spend(problem.n_nodes());
+            descent.linkage.refresh();
+        }
         let now = descent.energy();
-        if now > energy {
+        if now > energy
+            && let Some(before) = before
+        {
             // The sweep lowered the energy for the rotation that there was, and the rotation has changed.
             descent.linkage.set_shape(before);
             break;
@@ -90,7 +96,7 @@ struct Descent<'a, 'b> {
     /// The segments in it.
     segments: Range<usize>,
     path: Vec<usize>,
-    /// The pair that was last in the way of each joint; angles, then lengths.
+    /// The pair that was last in the way of each joint that counts; angles, then lengths.
     in_the_way: Vec<(u32, u32)>,
     /// What a move has to gain to be worth a try.
     need: f64,
@@ -98,20 +104,12 @@ struct Descent<'a, 'b> {
 
 impl<'a, 'b> Descent<'a, 'b> {
     fn new(problem: &'a Problem<'a>, linkage: &'b mut Linkage<'a>, window: Range<usize>) -> Self {
-        let n_joints = problem.n_nodes() + problem.branches.list().len();
         // Segments are in preorder too.
         let segment = |node: usize| problem.branch[node] as usize;
         let segments =
             if window.is_empty() { 0..0 } else { segment(window.start)..segment(window.end - 1) + 1 };
-        Self {
-            problem,
-            linkage,
-            window,
-            segments,
-            path: Vec::new(),
-            in_the_way: vec![(0, 0); n_joints],
-            need: 0.0,
-        }
+        let in_the_way = vec![(0, 0); window.len() + segments.len()];
+        Self { problem, linkage, window, segments, path: Vec::new(), in_the_way, need: 0.0 }
     }
 
     fn loss(&self) -> f64 {
@@ -176,14 +174,14 @@ impl<'a, 'b> Descent<'a, 'b> {
                     let new = best + share * (old - best);
                     let Some(ratio) = ratio_of(self.problem, node, new) else { continue };
                     self.linkage.change.angles.push((node, ratio));
-                    node
+                    node - self.window.start
                 }
                 Joint::Length(segment) => {
                     self.linkage
                         .change
                         .lengths
                         .push((segment, share * self.linkage.shape.length_ratio[segment]));
-                    self.problem.n_nodes() + segment
+                    self.window.len() + segment - self.segments.start
                 }
             };
             if self.make_if_clear(key, work) {
@@ -217,7 +215,7 @@ impl<'a, 'b> Descent<'a, 'b> {
                 continue;
             }
             for step in STEPS {
-                if self.set_shares(step) && self.make_if_clear(node, work) {
+                if self.set_shares(step) && self.make_if_clear(node - self.window.start, work) {
                     return;
                 }
             }
@@ -262,10 +260,10 @@ impl<'a, 'b> Descent<'a, 'b> {
         true
     }
 
-    /// Makes the change if it gains enough and is clear; `key` names the joint that it is for.
+    /// Makes the change if it gains enough and is clear; `key` is the place of its joint in `in_the_way`.
     fn make_if_clear(&mut self, key: usize, work: &mut Work) -> bool {
         let (a, b) = self.in_the_way[key];
-        work.spend(self.linkage.change.angles.len() + self.linkage.change.lengths.len());
+        work.spend(self.linkage.change.n_ratios());
         self.linkage.cut();
         if self.linkage.gain() <= self.need {
             return false;

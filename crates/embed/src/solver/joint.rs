@@ -28,6 +28,11 @@ impl Change {
         self.angles.clear();
         self.lengths.clear();
     }
+
+    /// How many ratios change.
+    pub(crate) fn n_ratios(&self) -> usize {
+        self.angles.len() + self.lengths.len()
+    }
 }
 
 /// A range of the preorder that turns and scales about a point.

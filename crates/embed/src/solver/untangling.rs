@@ -136,12 +136,14 @@ impl Untangling<'_> {
 
         // Both ways out, and what a descent makes of them: which is better is not known before.
         let stuck = (self.linkage.shape.clone(), self.crossings.clone());
+        work.spend(2 * self.problem.n_nodes());
         let retreated = self.leave(&Self::retreat, work).then(|| self.linkage.shape.clone());
         self.linkage.set_shape(stuck.0);
         self.crossings = stuck.1;
         let has_blended = self.leave(&Self::blend, work);
         if let Some(retreated) = retreated {
             let loss = |shape: &Shape| shape.loss(self.problem);
+            work.spend(self.problem.n_nodes());
             if !has_blended || loss(&retreated) < loss(&self.linkage.shape) {
                 self.linkage.set_shape(retreated);
                 self.crossings.clear();
@@ -179,6 +181,7 @@ impl Untangling<'_> {
                         let start = place * (leg.len() - n_nodes) / (n_places - 1).max(1);
                         let run = &leg[start..start + n_nodes];
                         for turn in TURNS_RAD.into_iter().flat_map(|turn| [turn, -turn]) {
+                            work.spend(run.len());
                             if self.set_bend(run, turn) {
                                 let loss = -self.linkage.loss_gain();
                                 bends.push((loss, leg_idx, start..start + n_nodes, turn));
@@ -189,6 +192,9 @@ impl Untangling<'_> {
             }
             bends.sort_by(|a, b| a.0.total_cmp(&b.0));
             for (_, leg, run, turn) in bends {
+                if work.is_spent() {
+                    return false;
+                }
                 self.set_bend(&legs[leg][run], turn);
                 if self.make_if_fewer(Rule::Clearance, work) {
                     return true;
@@ -230,7 +236,9 @@ impl Untangling<'_> {
         let mut ways = Vec::new();
         for top in self.subtrees_of_crossings() {
             for way in RETREATS {
-                if self.set_retreat(top, way) {
+                let is_in_range = self.set_retreat(top, way);
+                work.spend(self.linkage.change.n_ratios());
+                if is_in_range {
                     ways.push((-self.linkage.loss_gain(), top, way));
                 }
             }
@@ -299,6 +307,7 @@ impl Untangling<'_> {
         for &(a, b) in &self.crossings {
             on_legs.extend(self.legs(a as usize, b as usize).into_iter().flatten());
         }
+        work.spend(on_legs.len());
         on_legs.sort_unstable();
         on_legs.dedup();
         let (a, b) = self.crossings[0];
@@ -311,6 +320,7 @@ impl Untangling<'_> {
         let sets = [on_legs, of_smaller.collect(), of_fork.collect(), self.window.clone().collect()];
         for nodes in sets {
             for share in BLENDS {
+                work.spend(nodes.len());
                 self.set_blend(&nodes, share);
                 if self.make_if_fewer(Rule::Crossings, work) {
                     return true;
@@ -335,7 +345,7 @@ impl Untangling<'_> {
     /// Makes the change if it leaves fewer crossings.
     fn make_if_fewer(&mut self, rule: Rule, work: &mut Work) -> bool {
         self.linkage.cut();
-        work.spend(self.linkage.change.angles.len());
+        work.spend(self.linkage.change.n_ratios() + self.crossings.len() + self.recent.len());
         let is_kept = |&(a, b): &(u32, u32)| !self.linkage.parts_pair(a as usize, b as usize);
         let n_kept = self.crossings.iter().filter(|&pair| is_kept(pair)).count();
         let Some(most) = (self.crossings.len() - 1).checked_sub(n_kept) else { return false };
