@@ -6,8 +6,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use espalier_geom::random::{Purpose, Stream};
+use espalier_model::Diagnose;
 use espalier_pipeline::{Override, Stage, verify};
-use espalier_tests::{run, run_seen, set, small_swarm};
+use espalier_tests::{run, run_from, run_seen, set, small_swarm};
 use tempfile::TempDir;
 
 fn config(name: &str) -> PathBuf {
@@ -67,8 +68,68 @@ fn another_seed_leaves_nothing_of_the_first() {
     let shared = folder.path().join("shared");
     run(&neuron, &shared, &quick(), 2).expect("a run");
     let overrides = with(&quick(), "seed", "5");
-    let digest = run(&neuron, &shared, &overrides, 2).expect("a run").digest;
-    assert_eq!(digest, run(&neuron, &fresh, &overrides, 2).expect("a run").digest);
+    let (summary, done) = run_seen(&neuron, &shared, &overrides).expect("a run");
+    assert_eq!(done.len(), 6, "{done:?}");
+    assert_eq!(summary.digest, run(&neuron, &fresh, &overrides, 2).expect("a run").digest);
+}
+
+/// What is kept says of the folder only what the folder says of itself, until new results are there.
+#[test]
+fn a_run_that_fails_after_what_it_kept_leaves_a_whole_folder() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let swc = folder.path().join("fork.swc");
+    fs::write(&swc, "1 1 0 0 0 3 -1\n2 3 0 9 0 2 1\n3 3 9 18 4 1 2\n4 3 -9 18 -4 1 2\n").expect("write");
+    let edits = folder.path().join("edits.json");
+    fs::write(&edits, "{").expect("write");
+    let out = folder.path().join("out");
+    let first = run(&swc, &out, &quick(), 2).expect("a run").digest;
+    // Another name: all but the pictures is kept; with edits that are none, the embedding cannot be made.
+    let failing = with(&with(&quick(), "name", "other"), "embed.edits", &format!("{edits:?}"));
+    let (_, done) = run_seen(&swc, &out, &with(&quick(), "name", "other")).expect("a run");
+    assert!(
+        !done.contains(&Stage::Tree) && !done.contains(&Stage::Embed),
+        "a name is the picture's: {done:?}"
+    );
+    run_seen(&swc, &out, &failing).expect_err("no edits");
+    verify(&out, Some(1)).expect("a folder").verdict().expect("a folder that holds");
+    let (again, _) = run_seen(&swc, &out, &quick()).expect("a run");
+    assert_eq!(again.digest, first);
+}
+
+#[test]
+fn a_tree_that_was_altered_is_not_built_on() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let neuron = config("neuron.toml");
+    run(&neuron, folder.path(), &quick(), 2).expect("a run");
+    let tree = folder.path().join("tree.swc");
+    let text = fs::read_to_string(&tree).expect("a file");
+    fs::write(&tree, text + "# a note\n").expect("write");
+    let error = run_from(&neuron, folder.path(), &quick(), Stage::Embed).expect_err("an altered tree");
+    assert_eq!(error.code(), "E-RUN-ALTERED-FILE");
+}
+
+/// The data of a header counts, not the header alone.
+#[test]
+fn a_volume_of_two_files_is_known_by_both() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let header = "ObjectType = Image\nNDims = 3\nDimSize = 4 4 12\nElementSpacing = 1 1 1\n\
+                  ElementType = MET_UCHAR\nElementDataFile = mask.raw\n";
+    let data = |last: u8| -> Vec<u8> {
+        let inside = |i: usize| {
+            (1..3).contains(&(i % 4)) && (1..3).contains(&(i / 4 % 4)) && (1..11).contains(&(i / 16))
+        };
+        (0..192).map(|i| if i == 166 { last } else { u8::from(inside(i)) }).collect()
+    };
+    fs::write(folder.path().join("mask.mhd"), header).expect("write");
+    let to_skeleton = |last: u8| {
+        fs::write(folder.path().join("mask.raw"), data(last)).expect("write");
+        let (_, done) =
+            run_seen(&folder.path().join("mask.mhd"), &folder.path().join("out"), &quick()).expect("a run");
+        done
+    };
+    assert!(to_skeleton(1).contains(&Stage::Volume));
+    assert_eq!(to_skeleton(1), []);
+    assert!(to_skeleton(0).contains(&Stage::Volume), "the data has changed");
 }
 
 /// Every file of a run folder but those that hold times.

@@ -11,7 +11,7 @@ mod names;
 
 use std::fmt::Write as _;
 
-pub use colors::parse_colors;
+pub use colors::{parse_colors, rgb_from_hex};
 pub use names::parse_names;
 
 /// The colour table of branches with these colours, sRGB; branch 0 has the value 1.

@@ -135,10 +135,11 @@ impl Artifacts {
         Ok((cropped, path))
     }
 
-    /// The files that one beside the input is made of: several where it is a DICOM series; none if there is none.
+    /// The files that one beside the input is made of: several where it is a DICOM series, or a header
+    /// with its data; none if there is none.
     pub(crate) fn files_beside(&self, side: SideFile, stage: Stage) -> Result<Vec<PathBuf>, Error> {
         let Some(path) = self.side_paths.get(&side) else { return Ok(Vec::new()) };
-        if side != SideFile::Image {
+        if !matches!(side, SideFile::Image | SideFile::Labels) {
             return Ok(vec![path.clone()]);
         }
         espalier_volume::files(path, &self.beside_options())

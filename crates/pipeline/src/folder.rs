@@ -56,13 +56,16 @@ impl RunFolder {
         }
     }
 
-    /// Removes the folder if this run made it and has put nothing into it.
-    pub(crate) fn remove_if_unused(&self) {
-        if !self.made.is_empty() && self.digests.is_empty() {
-            // Only empty folders can be removed, so nothing is lost where this fails.
-            Lock::remove_file(&self.path);
-            self.made.iter().take_while(|folder| fs::remove_dir(folder).is_ok()).for_each(drop);
-        }
+    /// Whether this run made the folder and has put nothing into it.
+    pub(crate) fn is_unused(&self) -> bool {
+        !self.made.is_empty() && self.digests.is_empty()
+    }
+
+    /// Removes the folders that this run made, as far as they are empty. From then on nothing may be written: another run
+    /// may be in a folder of the name.
+    pub(crate) fn remove(&self) {
+        Lock::remove_file(&self.path);
+        self.made.iter().take_while(|folder| fs::remove_dir(folder).is_ok()).for_each(drop);
     }
 
     pub(crate) fn path(&self) -> &Path {

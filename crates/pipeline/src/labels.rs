@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 
 use espalier_model::Tree;
+use espalier_model::label_table::rgb_from_hex;
 use espalier_render::{LabelEntry, Labels};
 use espalier_report::Rows;
 
@@ -37,18 +38,11 @@ fn of_rows(rows: &Rows) -> Option<Labels> {
     order.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
     let entry = |&(_, _, row): &(i64, usize, usize)| LabelEntry {
         name: rows.text(row, "label_name").to_owned(),
-        color: color(rows.text(row, "label_color")),
+        color: rgb_from_hex(rows.text(row, "label_color")),
     };
     let place: BTreeMap<i64, usize> = order.iter().enumerate().map(|(i, (label, ..))| (*label, i)).collect();
     let of_branch = (0..rows.len()).map(|row| place.get(&label(row)?).copied()).collect();
     (!order.is_empty()).then(|| Labels { entries: order.iter().map(entry).collect(), of_branch })
-}
-
-/// `#rrggbb`.
-fn color(text: &str) -> Option<[u8; 3]> {
-    let digits = text.strip_prefix('#').filter(|digits| digits.len() == 6 && digits.is_ascii())?;
-    let part = |i: usize| u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).ok();
-    Some([part(0)?, part(1)?, part(2)?])
 }
 
 #[cfg(test)]

@@ -10,6 +10,8 @@ use std::path::Path;
 use crate::error::Error;
 
 const LOCK_FILE: &str = ".lock";
+/// How often a folder may vanish under whoever waits for it: once for each run that fails in it.
+const MOST_TRIES: u32 = 1000;
 
 /// What to do where another run holds the folder.
 #[derive(Clone, Copy)]
@@ -27,10 +29,14 @@ impl Lock {
     /// Takes the lock of a folder, which is made if it is not there.
     pub(crate) fn take(folder: &Path, patience: Patience<'_>) -> Result<Self, Error> {
         let create = |source| Error::Create { path: folder.to_owned(), source };
-        loop {
+        for tries_left in (0..MOST_TRIES).rev() {
             fs::create_dir_all(folder).map_err(create)?;
             let path = folder.join(LOCK_FILE);
-            let file = File::create(&path).map_err(create)?;
+            let file = match File::create(&path) {
+                // The holder takes the folder away with it at just this moment.
+                Err(source) if source.kind() == io::ErrorKind::NotFound && tries_left > 0 => continue,
+                created => created.map_err(create)?,
+            };
             match (file.try_lock(), patience) {
                 (Ok(()), _) => {}
                 (Err(TryLockError::WouldBlock), Patience::None) => {
@@ -49,6 +55,7 @@ impl Lock {
                 return Ok(Self(file));
             }
         }
+        Err(Error::Locked { folder: folder.to_owned() })
     }
 
     /// Removes the file of the lock from a folder that is about to go; the lock itself is held on.

@@ -99,10 +99,7 @@ pub(crate) fn slices(
     mask: &Mask,
     report: &mut Report,
 ) -> Result<Vec<(String, Vec<u8>)>, Error> {
-    let params = &step.config.volume;
-    let is_scan = params.preset.is_some()
-        || matches!(params.method, espalier_volume::Method::Threshold | espalier_volume::Method::RegionGrow);
-    if !is_scan {
+    if !step.config.volume.is_of_scan() {
         return Ok(Vec::new());
     }
     let scan = step.take(Artifacts::scan)?;

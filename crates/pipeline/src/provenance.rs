@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::clock;
 use crate::config::{Config, UNNAMED};
 use crate::error::Error;
-use crate::folder::{RunFolder, file_digest};
+use crate::folder::{RunFolder, file_digest, hex_digest};
 use crate::record::Record;
 use crate::settings;
 use crate::side_file::SideFile;
@@ -147,6 +147,15 @@ fn is_of(role: &str, row: &str) -> bool {
 pub(crate) fn digest(path: &Path) -> Result<String, Error> {
     let digest = file_digest(path).map_err(|source| Error::Read { path: path.to_owned(), source });
     digest.map(|(_, digest)| digest)
+}
+
+/// The SHA-256 of a file that the user names; of several files that make it up, one over their rows.
+pub(crate) fn digest_of_all(files: &[PathBuf], path: &Path) -> Result<String, Error> {
+    match files {
+        [] => digest(path),
+        [one] => digest(one),
+        files => input_rows(files).map(|rows| hex_digest(rows.as_bytes())),
+    }
 }
 
 /// The row of a file.

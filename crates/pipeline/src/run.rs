@@ -85,13 +85,14 @@ fn run_stages(request: &Request, events: &(dyn Fn(Event) + Sync)) -> Result<Summ
     let patience = if request.wait { Patience::Wait(&say_so) } else { Patience::None };
     let mut folder = RunFolder::open_or_wait(&request.out, patience)?;
     folder.forget_unless(is_known);
+    failure::clear(&folder);
     let done = run.perform(&mut folder, &stages);
-    if done.is_ok() {
-        failure::clear(&folder);
-    }
     if let Err(error) = &done {
-        folder.remove_if_unused();
-        failure::write(&folder, error, run.input.as_deref());
+        if folder.is_unused() {
+            folder.remove();
+        } else {
+            failure::write(&folder, error);
+        }
         let kept = run.costs.iter().map(|cost| cost.stage).collect();
         events(Event::Stopped { kept, out: request.out.clone() });
     }
@@ -130,6 +131,7 @@ fn prepare<'a>(
         input,
         input_rows: None,
         foreign: Vec::new(),
+        kept: Vec::new(),
         costs: Vec::new(),
     };
     Ok((run, stages))
@@ -181,6 +183,8 @@ struct Run<'a> {
     input_rows: Option<String>,
     /// Stages whose files in the folder are of another run.
     foreign: Vec<Stage>,
+    /// Stages that were kept, as long as inputs and settings do not yet say so.
+    kept: Vec<Stage>,
     costs: Vec<StageCost>,
 }
 
@@ -189,17 +193,39 @@ impl Run<'_> {
     fn perform(&mut self, folder: &mut RunFolder, stages: &[Stage]) -> Result<String, Error> {
         let mut settings = Settings::open(folder, &self.request.loaded.config);
         self.refuse_other_settings(folder, &settings, stages)?;
+        self.check_hand_over(folder, stages)?;
         self.take_stock_of_input(stages)?;
         self.foreign = self.foreign(&settings);
         for &stage in stages {
+            if stage == Stage::Report {
+                // It reads the inputs of all stages before, which are in place by now.
+                self.settle_kept(folder, &mut settings)?;
+                folder.seal()?;
+            }
             let made_from = self.made_from(folder, &settings, stage)?;
             match self.standing(folder, stage, &made_from)? {
-                Ok(record) => self.keep(folder, &mut settings, stage, record)?,
+                Ok(record) => self.keep(folder, stage, record)?,
                 Err(_) => self.make(folder, &mut settings, stage, made_from)?,
             }
         }
         stages.last().map_or(Ok(()), |&last| self.clear_away(folder, last))?;
+        self.settle_kept(folder, &mut settings)?;
         folder.seal()
+    }
+
+    /// Checks what stages hand over that are not done in this run: results made from it count as long as it is what it was.
+    fn check_hand_over(&self, folder: &RunFolder, stages: &[Stage]) -> Result<(), Error> {
+        let is_made_here =
+            |file: &str| stages.iter().any(|stage| stage.writes().iter().any(|own| own == file));
+        let handed = stages.iter().flat_map(|stage| stage.reads());
+        let handed = handed.filter(|artifact| !self.artifacts.files.contains_key(artifact));
+        for file in handed.map(|artifact| artifact.file()).filter(|file| !is_made_here(file)) {
+            let (stated, found) = (folder.digest(file), folder.digest_if_there(file)?);
+            if stated.is_some() && found.is_some() && found.as_ref() != stated {
+                return Err(Error::Altered { path: folder.path().join(file) });
+            }
+        }
+        Ok(())
     }
 
     /// Digests of the input's files.
@@ -220,18 +246,13 @@ impl Run<'_> {
         if self.request.force { Ok(Err(Reason::Forced)) } else { Record::standing(folder, stage, made_from) }
     }
 
-    /// Keeps a stage's results, and repeats what was said of them.
-    fn keep(
-        &self,
-        folder: &mut RunFolder,
-        settings: &mut Settings,
-        stage: Stage,
-        record: Record,
-    ) -> Result<(), Error> {
+    /// Keeps a stage's results, and repeats what was said of them. The folder's inputs and settings are brought up to date
+    /// only with the next results that are written: until then they are those of all that lies there.
+    fn keep(&mut self, folder: &mut RunFolder, stage: Stage, record: Record) -> Result<(), Error> {
         let record_file = Record::file_of(stage);
         let own = folder.digest_if_there(&record_file)?.map(|digest| (record_file, digest));
         folder.adopt(record.files().clone().into_iter().chain(own));
-        self.write_provenance(folder, settings, stage)?;
+        self.kept.push(stage);
         for (code, message) in provenance::warnings(folder, stage)? {
             (self.events)(Event::Warning { stage, code, message });
         }
@@ -257,6 +278,7 @@ impl Run<'_> {
         let parts = step.parts;
         debug_assert_eq!(undeclared(stage, folder.take_reads()), [""; 0], "read by {stage}");
         self.clear_away(folder, stage)?;
+        self.settle_kept(folder, settings)?;
         write_outcome(folder, (stage, made_from), &outcome)?;
         self.write_provenance(folder, settings, stage)?;
         let digest = folder.seal()?;
@@ -270,6 +292,13 @@ impl Run<'_> {
         }
         events(Event::Finished { stage, seconds, line: outcome.line });
         Ok(())
+    }
+
+    /// Inputs and settings of the stages that were kept.
+    fn settle_kept(&mut self, folder: &mut RunFolder, settings: &mut Settings) -> Result<(), Error> {
+        std::mem::take(&mut self.kept)
+            .into_iter()
+            .try_for_each(|stage| self.write_provenance(folder, settings, stage))
     }
 
     /// Inputs and settings as far as they are a stage's.
@@ -295,21 +324,21 @@ impl Run<'_> {
         facts.insert("version".to_owned(), version);
         let is_traced = stage == Stage::Tree && self.artifacts.is_traced(&self.source);
         let artifacts = if is_traced { &[Artifact::Traced] } else { stage.reads() };
-        for artifact in artifacts {
+        // Of the files that the user names it may read others too; and what lies in the folder beside them does not count.
+        let named = self.request.files.keys();
+        for artifact in artifacts.iter().chain(named) {
             let digest = match self.artifacts.files.get(artifact) {
                 Some(path) => Some(self.digest_of_input(*artifact, path)?),
                 None => folder.digest(artifact.file()).cloned(),
             };
             facts.extend(digest.map(|digest| (artifact.what().to_owned(), digest)));
         }
+        facts.insert("files named".to_owned(), (!self.request.files.is_empty()).to_string());
         for file in stage.reads_beside() {
             facts.extend(folder.digest(&file).cloned().map(|digest| (file, digest)));
         }
         for (side, path) in self.artifacts.side_paths.iter().filter(|(side, _)| side.stage() == stage) {
-            let digest = match self.artifacts.files_beside(*side, stage)?.as_slice() {
-                [one] if one == path => provenance::digest(path)?,
-                files => hex_digest(provenance::input_rows(files)?.as_bytes()),
-            };
+            let digest = provenance::digest_of_all(&self.artifacts.files_beside(*side, stage)?, path)?;
             facts.insert(side.key().to_owned(), digest);
         }
         // A map that shows the run's own input depends on it.
@@ -321,10 +350,15 @@ impl Run<'_> {
         Ok(MadeFrom(facts))
     }
 
-    /// The digest of a file that the user names; of a series, one over all of its files.
+    /// The digest of a file that the user names; of a series, or a header with its data, one over all of its files.
     fn digest_of_input(&self, artifact: Artifact, path: &Path) -> Result<String, Error> {
         match (&self.input_rows, artifact) {
             (Some(rows), Artifact::Volume | Artifact::Traced) => Ok(hex_digest(rows.as_bytes())),
+            (_, Artifact::Volume | Artifact::Mask | Artifact::Skeleton) => {
+                // What cannot be read is told by the stage that reads it.
+                let files = espalier_volume::files(path, &self.artifacts.read_options).unwrap_or_default();
+                provenance::digest_of_all(&files, path)
+            }
             _ => provenance::digest(path),
         }
     }
@@ -431,9 +465,7 @@ fn outdated(stage: Stage, mut changed: BTreeSet<String>) -> Vec<String> {
         Stage::ALL.into_iter().filter(|s| *s < stage).flat_map(Stage::writes).collect();
     let kept: BTreeSet<String> = stage.writes().into_iter().filter(|file| !changed.contains(file)).collect();
     for later in Stage::ALL.into_iter().filter(|later| *later > stage) {
-        let reads =
-            later.reads().iter().map(|artifact| artifact.file().to_owned()).chain(later.reads_beside());
-        if reads.into_iter().any(|file| changed.contains(&file)) {
+        if later.files_read().any(|file| changed.contains(&file)) {
             changed.extend(later.writes());
         }
     }

@@ -7,7 +7,7 @@
 use espalier_model::diagnose::{Class, Diagnose};
 use espalier_model::{Report, Tree, Volume};
 use espalier_render::{Params, Style};
-use espalier_volume::{Kind, Method};
+use espalier_volume::Kind;
 use glam::DVec3;
 use thiserror::Error;
 
@@ -68,11 +68,9 @@ pub(crate) fn check(config: &Config, source: &Source) -> Result<(), NoScan> {
     if !is_of_input(config) {
         return Ok(());
     }
-    let is_scan = config.volume.preset.is_some()
-        || matches!(config.volume.method, Method::Threshold | Method::RegionGrow);
     match source {
         Source::PhantomScan(_) => Ok(()),
-        Source::Volume(_) if is_scan => Ok(()),
+        Source::Volume(_) if config.volume.is_of_scan() => Ok(()),
         Source::Volume(_) => Err(NoScan::Input { what: "a mask or a label map" }),
         Source::Tree(_) | Source::PhantomTree(_) => Err(NoScan::Input { what: "a traced tree" }),
     }

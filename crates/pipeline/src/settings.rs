@@ -22,6 +22,8 @@ const IDENTITY: [&str; 3] = ["schema", "seed", "input"];
 /// The settings of a run folder, those it has and those of the run that is under way.
 pub(crate) struct Settings {
     kept: Option<Table>,
+    /// Whether they were altered, or left by a run that was killed: then no setting agrees with them.
+    is_altered: bool,
     wanted: Table,
 }
 
@@ -41,21 +43,22 @@ pub struct Difference {
 impl Settings {
     /// The settings of a folder about to see a run of `config`.
     pub(crate) fn open(folder: &RunFolder, config: &Config) -> Self {
-        let kept =
-            folder.read(FILE).ok().and_then(|bytes| toml::from_str(&String::from_utf8(bytes).ok()?).ok());
-        Self { kept, wanted: portable(config) }
+        let parsed = |bytes| toml::from_str(&String::from_utf8(bytes).ok()?).ok();
+        let read = folder.read(FILE);
+        let is_altered = matches!(read, Err(Error::Altered { .. }));
+        Self { kept: read.ok().and_then(parsed), is_altered, wanted: portable(config) }
     }
 
     /// Whether the folder's results are of another run: another input, another seed.
     pub(crate) fn is_other_run(&self) -> bool {
-        self.kept
-            .as_ref()
-            .is_some_and(|kept| IDENTITY.iter().any(|key| kept.get(*key) != self.wanted.get(*key)))
+        let differs = |kept: &Table| IDENTITY.iter().any(|key| kept.get(*key) != self.wanted.get(*key));
+        self.is_altered || self.kept.as_ref().is_some_and(differs)
     }
 
     /// The first setting that the results of `earlier` stages were not made with; `first` is the run's first stage.
     pub(crate) fn difference(&self, earlier: &[Stage], first: Stage) -> Option<Difference> {
-        let kept = self.kept.as_ref()?;
+        let nothing = self.is_altered.then(Table::new);
+        let kept = nothing.as_ref().or(self.kept.as_ref())?;
         let identity = IDENTITY.iter().map(|key| (*key, first));
         let tables = earlier.iter().map(|stage| (stage.name(), *stage));
         identity.chain(tables).find_map(|(key, stage)| {

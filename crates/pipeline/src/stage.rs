@@ -111,9 +111,13 @@ impl Stage {
         }
     }
 
-    /// The version of what it makes: another one makes other results from the same input and settings.
+    /// The version of what it makes. A change of the code that changes results takes the next number, or folders keep what
+    /// the code before made.
     pub(crate) fn version(self) -> u32 {
-        1
+        match self {
+            Self::Phantom | Self::Skeleton | Self::Views => 1,
+            Self::Volume | Self::Radius | Self::Tree | Self::Embed | Self::Render | Self::Report => 2,
+        }
     }
 
     /// The files of earlier stages that it reads beside its artifacts, relative to the run folder. The page reads every
@@ -142,9 +146,7 @@ impl Stage {
     /// Whether it reads a file that another stage writes.
     pub(crate) fn follows(self, other: Self) -> bool {
         let written = other.writes();
-        let mut reads =
-            self.reads().iter().map(|artifact| artifact.file().to_owned()).chain(self.reads_beside());
-        other < self && reads.any(|file| written.contains(&file))
+        other < self && self.files_read().any(|file| written.contains(&file))
     }
 
     /// Every file it may write, relative to the run folder.

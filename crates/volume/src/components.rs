@@ -1,7 +1,7 @@
 //! The components of a mask that stay, mostly the largest.
 //!
-//! **Input** a mask and its runs; how many components stay, and from which volume or share of the largest on. **Output** the same without
-//! the others, and a ledger entry for each that went.
+//! **Input** a mask and its runs; how many components stay, and from which volume or share of the largest on.
+//! **Output** the same without the others, and a ledger entry for each that went.
 //! **Steps** 1. label the 26-connected components; 2. rank them by size, of equal ones the first in storage order;
 //! 3. clear all beyond the limits.
 //! **Cost** O(runs · α(runs)) time, O(runs) memory.

@@ -264,6 +264,12 @@ impl Visitor<'_> for ComponentsVisitor {
 }
 
 impl Params {
+    /// Whether the input is taken for a scan, whose values mean something, not for a mask or a label map.
+    #[must_use]
+    pub fn is_of_scan(&self) -> bool {
+        self.preset.is_some() || matches!(self.method, Method::Threshold | Method::RegionGrow)
+    }
+
     /// Checks each value, and that no key is set that the method would not look at.
     ///
     /// # Errors

@@ -50,8 +50,9 @@ fn parts(words: [&str; 3]) -> Option<[u8; 3]> {
     Some([red?, green?, blue?])
 }
 
-/// `#rrggbb`.
-fn hex(word: &str) -> Option<[u8; 3]> {
+/// The red, green and blue of `#rrggbb`.
+#[must_use]
+pub fn rgb_from_hex(word: &str) -> Option<[u8; 3]> {
     let digits = word.strip_prefix('#').filter(|digits| digits.len() == 6 && digits.is_ascii())?;
     let part = |i: usize| u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).ok();
     Some([part(0)?, part(1)?, part(2)?])
@@ -79,7 +80,7 @@ impl Columns {
     fn entry(&self, line: &str) -> Option<(i64, [u8; 3])> {
         let cells: Vec<&str> = cells(line, self.separator).collect();
         let cell = |column: usize| cells.get(column).copied().unwrap_or_default();
-        let color = self.color.and_then(|column| hex(cell(column)));
+        let color = self.color.and_then(|column| rgb_from_hex(cell(column)));
         let color = color.or_else(|| self.parts.and_then(|columns| parts(columns.map(cell))))?;
         Some((cell(self.value).parse().ok()?, color))
     }

@@ -52,7 +52,10 @@ pub(super) fn run(path: &Path, label: &str, side_px: u32) -> GroupOutcome {
 /// A run that has no map yet.
 fn unfinished(folder: &RunFolder, label: &str) -> Failed {
     let done = done_to(folder);
-    let next = done.map_or(Some(Stage::Phantom), |done| Stage::ALL.into_iter().find(|stage| *stage > done));
+    // A traced phantom has no scan, so that its tree comes next.
+    let is_traced = done == Some(Stage::Phantom) && !folder.path().join(Artifact::Volume.file()).exists();
+    let comes_next = |stage: &Stage| Some(*stage) > done && (*stage >= Stage::Tree || !is_traced);
+    let next = Stage::ALL.into_iter().find(comes_next);
     let noted = failure::read(folder.path());
     let (code, reason) = match noted {
         Some(failure) => {
