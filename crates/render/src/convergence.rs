@@ -9,10 +9,7 @@
 //! **Guarantees** work is counted, not timed, so that the figure is the same on every machine.
 //! **Cost** O(points).
 
-use std::fmt::Write as _;
-
 use espalier_geom::math;
-use espalier_model::xml::escape;
 use espalier_model::{MethodRow, TracePoint};
 use glam::DVec2;
 
@@ -20,7 +17,7 @@ use crate::drawing::{Group, Mark};
 use crate::furniture::{self, Heading};
 use crate::page::{MAX_PIXELS, Page};
 use crate::paint::Canvas;
-use crate::palette::{PageColors, Palette, Rgb, hex};
+use crate::palette::{PageColors, Palette, Rgb};
 use crate::params::Params;
 use crate::side_by_side::SideBySide;
 use crate::text::{Anchor, Face};
@@ -76,7 +73,7 @@ pub fn convergence(methods: &[Searched<'_>], params: &Params) -> Result<SideBySi
     canvas.mark(&groups, &face);
     let png = canvas.png();
     let title = said.title.unwrap_or_else(|| "convergence".to_owned());
-    Ok(SideBySide { png, svg: document(&title, &groups, [width, height], &colors) })
+    Ok(SideBySide { png, svg: svg::plot("convergence", &title, &groups, ([width, height], &colors)) })
 }
 
 fn heading(params: &Params, methods: &[Searched<'_>]) -> Heading {
@@ -343,23 +340,6 @@ fn counted(value: f64) -> String {
         .find(|&(factor, _)| value >= factor * (1.0 - 1e-9))
         .unwrap_or((1.0, ""));
     format!("{}{sign}", unit::text(value / factor, 3))
-}
-
-fn document(title: &str, groups: &[Group], [width, height]: [u32; 2], colors: &PageColors) -> String {
-    let mut out = String::new();
-    // Writing to a String cannot fail.
-    let _ = writeln!(
-        out,
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" version=\"1.1\" \
-         width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
-         data-format=\"espalier-convergence-svg\" data-version=\"1\">\n<title>{}</title>\n\
-         <rect id=\"background\" width=\"{width}\" height=\"{height}\" fill=\"{}\"/>",
-        escape(title),
-        hex(colors.background)
-    );
-    svg::write_groups(&mut out, groups);
-    out.push_str("</svg>\n");
-    out
 }
 
 #[cfg(test)]

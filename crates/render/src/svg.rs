@@ -87,6 +87,29 @@ pub(crate) fn svg(
     out
 }
 
+/// A plot as a document of its own, `espalier-KIND-svg`.
+pub(crate) fn plot(
+    kind: &str,
+    title: &str,
+    groups: &[Group],
+    ([width, height], colors): ([u32; 2], &PageColors),
+) -> String {
+    let mut out = String::new();
+    // Writing to a String cannot fail.
+    let _ = writeln!(
+        out,
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" version=\"1.1\" \
+         width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
+         data-format=\"espalier-{kind}-svg\" data-version=\"1\">\n<title>{}</title>\n\
+         <rect id=\"background\" width=\"{width}\" height=\"{height}\" fill=\"{}\"/>",
+        escape(title),
+        hex(colors.background)
+    );
+    write_groups(&mut out, groups);
+    out.push_str("</svg>\n");
+    out
+}
+
 /// Marks in named groups.
 pub(crate) fn write_groups(out: &mut String, groups: &[Group]) {
     for group in groups {

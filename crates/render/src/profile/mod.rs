@@ -14,19 +14,15 @@
 
 mod artist;
 
-use std::fmt::Write as _;
-
 use espalier_model::anatomy::{ProfileRow, Spread, Stenosis};
-use espalier_model::xml::escape;
 use glam::DVec2;
 
 use artist::Artist;
 
-use crate::drawing::Group;
 use crate::furniture::{self, Heading};
 use crate::page::{MAX_PIXELS, Page};
 use crate::paint::Canvas;
-use crate::palette::{PageColors, hex};
+use crate::palette::PageColors;
 use crate::params::Params;
 use crate::side_by_side::SideBySide;
 use crate::text::Face;
@@ -99,7 +95,10 @@ pub fn profile(way: &Way<'_>, params: &Params) -> Result<SideBySide, Error> {
     }
     let mut canvas = Canvas::new([width, height], colors.background)?;
     canvas.mark(&groups, &face);
-    Ok(SideBySide { png: canvas.png(), svg: document(&way.title, &groups, [width, height], &colors) })
+    Ok(SideBySide {
+        png: canvas.png(),
+        svg: svg::plot("profile", &way.title, &groups, ([width, height], &colors)),
+    })
 }
 
 fn heading(way: &Way<'_>, axes: &Axes) -> Heading {
@@ -202,23 +201,6 @@ impl Axes {
     fn radius(&self, radius_mm: f64) -> String {
         format!("{} {}", unit::text(radius_mm / self.units[1].mm, 3), self.units[1].sign)
     }
-}
-
-fn document(title: &str, groups: &[Group], [width, height]: [u32; 2], colors: &PageColors) -> String {
-    let mut out = String::new();
-    // Writing to a String cannot fail.
-    let _ = writeln!(
-        out,
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" version=\"1.1\" \
-         width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
-         data-format=\"espalier-profile-svg\" data-version=\"1\">\n<title>{}</title>\n\
-         <rect id=\"background\" width=\"{width}\" height=\"{height}\" fill=\"{}\"/>",
-        escape(title),
-        hex(colors.background)
-    );
-    svg::write_groups(&mut out, groups);
-    out.push_str("</svg>\n");
-    out
 }
 
 #[cfg(test)]
