@@ -195,22 +195,26 @@ fn tubes(pieces: &[Piece], is_own: &[bool]) -> Markup {
     for (width, path) in fine_paths {
         let _ = write!(out, "<path class=\"fine\" style=\"--w:{width}\" d=\"{path}\"/>");
     }
-    for piece in order {
-        let classes: Vec<String> =
-            piece.bins.iter().enumerate().map(|(index, bin)| format!("{}{bin}", letter(index))).collect();
-        let _ = write!(
-            out,
-            "<path class=\"{}\" data-b=\"{}\" style=\"--w:{}\" d=\"{}\"/>",
-            classes.join(" "),
-            piece.branch,
-            piece.width,
-            path(&piece.points)
-        );
-    }
+    order.into_iter().for_each(|piece| write_tube(&mut out, piece));
     html! {
         use.rim href="#tubes" {}
         g #tubes.tubes { (PreEscaped(out)) }
     }
+}
+
+/// A piece of a branch as a path that says which branch it is and its class in each colouring.
+pub(crate) fn write_tube(out: &mut String, piece: &Piece) {
+    let classes = piece.bins.iter().enumerate();
+    let classes: Vec<String> = classes.map(|(index, bin)| format!("{}{bin}", letter(index))).collect();
+    // Writing to a String cannot fail.
+    let _ = write!(
+        out,
+        "<path class=\"{}\" data-b=\"{}\" style=\"--w:{}\" d=\"{}\"/>",
+        classes.join(" "),
+        piece.branch,
+        piece.width,
+        path(&piece.points)
+    );
 }
 
 fn root_mark(facts: &Facts<'_>, frame: &Frame) -> Markup {

@@ -7,12 +7,11 @@
 use espalier_model::Branches;
 use glam::DVec2;
 use maud::{Markup, PreEscaped, html};
-use std::fmt::Write as _;
 
 use crate::facts::{Coloring, Facts};
 use crate::layout::{Frame, bounds};
-use crate::map::letter;
-use crate::strokes::{self, Budget, Subject, path};
+use crate::map::write_tube;
+use crate::strokes::{self, Budget, Subject};
 
 const BUDGET: Budget = Budget { pieces: 6_000, points: 40_000 };
 /// Room around the tree.
@@ -40,19 +39,7 @@ pub(crate) fn body(
     };
     pieces.sort_by(|a, b| depth(a.branch).total_cmp(&depth(b.branch)).then(a.branch.cmp(&b.branch)));
     let mut out = String::new();
-    for piece in &pieces {
-        let classes = piece.bins.iter().enumerate();
-        let classes: Vec<String> = classes.map(|(index, bin)| format!("{}{bin}", letter(index))).collect();
-        // Writing to a String cannot fail.
-        let _ = write!(
-            out,
-            "<path class=\"{}\" data-b=\"{}\" style=\"--w:{}\" d=\"{}\"/>",
-            classes.join(" "),
-            piece.branch,
-            piece.width,
-            path(&piece.points)
-        );
-    }
+    pieces.iter().for_each(|piece| write_tube(&mut out, piece));
     html! {
         div.canvas.space {
             svg #space-svg viewBox=(frame.view_box()) role="img" aria-label="the tree in space, from its global view" {

@@ -5,6 +5,7 @@
 //! that all have in common are left out. 3. What is still alike is numbered.
 //! **Guarantees** no part that the user has not typed, but names of run folders below a folder that was given.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path};
 
 pub(super) fn of(paths: &[&Path]) -> Vec<String> {
@@ -13,11 +14,17 @@ pub(super) fn of(paths: &[&Path]) -> Vec<String> {
     let is_common = |depth: &usize| parts.iter().all(|other| other[*depth] == parts[0][*depth]);
     let n_common = (0..shortest.saturating_sub(1)).take_while(is_common).count();
     let mut labels: Vec<String> = Vec::with_capacity(parts.len());
-    let mut known = std::collections::BTreeSet::new();
+    let mut known = BTreeSet::new();
+    // The number to go on with, by label: thousands may be alike.
+    let mut next: BTreeMap<String, usize> = BTreeMap::new();
     for parts in &parts {
         let label = parts[n_common..].join("/");
-        let free = (1..).map(|n| if n == 1 { label.clone() } else { format!("{label} ({n})") });
-        labels.extend(free.into_iter().find(|label| known.insert(label.clone())));
+        let number = next.entry(label.clone()).or_insert(1);
+        let free = (*number..).map(|n| (n, if n == 1 { label.clone() } else { format!("{label} ({n})") }));
+        if let Some((n, free)) = free.into_iter().find(|(_, label)| known.insert(label.clone())) {
+            *number = n + 1;
+            labels.push(free);
+        }
     }
     labels
 }
