@@ -1,4 +1,4 @@
-//! SWC: the rules of the reader case by case, and every file of the real and the bad data.
+//! SWC: the rules of the reader case by case, and every neuron of the real data.
 #![allow(clippy::expect_used, clippy::panic, clippy::print_stdout, reason = "this is how a test speaks")]
 #![allow(clippy::disallowed_methods, reason = "tests find their data through the environment")]
 
@@ -167,26 +167,6 @@ fn swc_files(folder: &Path) -> Vec<PathBuf> {
     }
     found.sort();
     found
-}
-
-/// What each file of the bad data must give; the table is complete in both directions.
-#[test]
-fn bad_data() {
-    let Some(data) = data() else { return };
-    let expected: Vec<(&str, &str)> = include_str!("swc_bad.tsv")
-        .lines()
-        .filter(|line| !line.starts_with('#'))
-        .map(|line| line.split_once('\t').expect("two columns"))
-        .collect();
-    let bad = data.join("bad");
-    let mut found: Vec<(String, String)> = Vec::new();
-    for path in swc_files(&bad) {
-        let name = path.strip_prefix(&bad).expect("below").to_string_lossy().replace('\\', "/");
-        found.push((name, outcome(&std::fs::read(&path).expect("readable"))));
-    }
-    let text = |rows: &[(&str, &str)]| rows.iter().map(|(f, o)| format!("{f}\t{o}\n")).collect::<String>();
-    let found: Vec<(&str, &str)> = found.iter().map(|(f, o)| (f.as_str(), o.as_str())).collect();
-    assert_eq!(text(&found), text(&expected), "left: found, right: expected");
 }
 
 #[test]

@@ -1,62 +1,15 @@
-//! DICOM of other people: what each file and folder of the data comes to, and the scans among them against the same
-//! scans in other formats and as another program reads them.
+//! Scans of other people in DICOM against the same scans in other formats and as another program reads them.
 #![allow(clippy::expect_used, clippy::print_stdout, reason = "this is how a test speaks")]
 
 mod common;
 
-use std::path::{Path, PathBuf};
-
-use common::{data, load, outcome};
+use common::{data, load};
 use espalier_model::Volume;
 use espalier_volume::{Loaded, ReadOptions, read};
 use glam::DVec3;
 
 fn resampled() -> ReadOptions {
     ReadOptions { resample: true, ..ReadOptions::default() }
-}
-
-/// The files below a folder, and the folders themselves, by name.
-fn places_below(folder: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
-    let (mut files, mut folders) = (Vec::new(), vec![folder.to_owned()]);
-    for entry in std::fs::read_dir(folder).expect("a readable folder") {
-        let path = entry.expect("an entry").path();
-        if path.is_dir() {
-            let below = places_below(&path);
-            files.extend(below.0);
-            folders.extend(below.1);
-        } else {
-            files.push(path);
-        }
-    }
-    files.sort();
-    folders.sort();
-    (files, folders)
-}
-
-/// The table is complete in both directions. Each file stands alone in a folder of its own, so that its neighbours
-/// have no say; then each folder as it is, and resampled.
-#[test]
-fn every_bad_file_and_folder() {
-    let Some(data) = data() else { return };
-    let bad = data.join("bad");
-    let (files, mut folders) = places_below(&bad.join("dicom"));
-    folders.push(bad.join("dicom_gantry_tilt_uneven"));
-    let name = |path: &Path| path.strip_prefix(&bad).expect("below").to_string_lossy().replace('\\', "/");
-    let mut found = String::new();
-    for path in &files {
-        let folder = tempfile::tempdir().expect("a folder");
-        let copy = folder.path().join("a");
-        std::fs::copy(path, &copy).expect("copied");
-        let outcome = outcome(&copy, &ReadOptions::default());
-        found.push_str(&format!("{}\t{outcome}\n", name(path)));
-    }
-    for folder in &folders {
-        let outcomes = [ReadOptions::default(), resampled()].map(|options| outcome(folder, &options));
-        found.push_str(&format!("{}/\t{}\n", name(folder), outcomes.join("\t")));
-    }
-    let expected = include_str!("dicom_data.tsv").lines().filter(|line| !line.starts_with('#'));
-    let expected: String = expected.map(|line| format!("{line}\n")).collect();
-    assert_eq!(found, expected, "left: found, right: expected");
 }
 
 /// The same scan as DICOM and as NRRD: every value at the same place in the body.
