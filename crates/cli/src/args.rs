@@ -28,6 +28,7 @@ Examples:
   espalier sweep my.toml --over embed.w_length=0.5,1,2  losses against a setting: table and plot
   espalier group out -o group                           one page over all runs in a folder
   espalier phantom airway -o phantoms/airway            test data with its truth
+  espalier explain E-VOLUME-NO-SPACE                    what an error code means, and the way out
 
 Exit codes:
   0 done   1 a bug of ours   2 usage or config   3 input malformed or empty   5 over a stated limit
@@ -156,6 +157,8 @@ pub(crate) enum Command {
     Profile(ProfileArguments),
     /// From the scan to the map and back, of a run:  espalier locate RUN X,Y,Z, or espalier locate RUN U,V
     Locate(LocateArguments),
+    /// What an error or warning code means and what to do:  espalier explain E-VOLUME-NO-SPACE
+    Explain(ExplainArguments),
     /// Print a script that completes commands and options in a shell:  espalier completions bash
     Completions {
         /// The shell
@@ -437,6 +440,16 @@ pub(crate) struct LocateArguments {
     #[arg(long)]
     pub(crate) pixel: bool,
     /// Print the points as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `espalier explain`.
+#[derive(Debug, Args)]
+pub(crate) struct ExplainArguments {
+    /// The code, as the message has it in square brackets [default: list all codes]
+    pub(crate) code: Option<String>,
+    /// Print as JSON: code, part, exit_codes, title, cause, way_out, example
     #[arg(long)]
     pub(crate) json: bool,
 }

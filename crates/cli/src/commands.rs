@@ -22,6 +22,7 @@ use crate::args::{
     VerifyArguments,
 };
 use crate::checks;
+use crate::explain;
 use crate::progress::{self, Progress};
 
 /// Memory assumed where the machine does not tell its own.
@@ -48,6 +49,7 @@ pub(crate) fn execute(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Verify(verify) => return verify_folder(arguments, verify),
         Command::Profile(profile) => return print_profile(arguments, profile),
         Command::Locate(locate) => return print_located(arguments, locate),
+        Command::Explain(explain) => return explain::print(explain),
         Command::Completions { shell } => {
             progress::result(completions(*shell).trim_end());
             return Ok(());
@@ -174,6 +176,9 @@ pub(crate) fn report_failure(error: &anyhow::Error) -> ExitCode {
     progress::line(&format!("error[{code}]: {error}"));
     if !hint.is_empty() {
         progress::line(&format!("  hint: {hint}"));
+    }
+    if espalier_pipeline::explain::is_worth_reading(code, &hint) {
+        progress::line(&format!("  more: espalier explain {code}"));
     }
     ExitCode::from(class.exit_code())
 }

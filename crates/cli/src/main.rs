@@ -7,6 +7,7 @@ mod args;
 mod cancel;
 mod checks;
 mod commands;
+mod explain;
 mod progress;
 
 use std::process::ExitCode;

@@ -86,7 +86,7 @@ fn missing_file() {
     let folder = tempfile::tempdir().expect("temporary folder");
     refused(&folder, &["run", "nowhere.nii.gz"], 74, &["nowhere.nii.gz", "hint"]);
     assert!(listing(folder.path()).is_empty());
-    refused(&folder, &["run", "nowhere.toml"], 74, &["nowhere.toml"]);
+    refused(&folder, &["run", "nowhere.toml"], 74, &["error[E-IO-READ]", "nowhere.toml"]);
 }
 
 #[test]
@@ -125,7 +125,12 @@ fn swc_with_a_cycle() {
 fn misspelt_key() {
     let config = "schema = 1\nname = \"x\"\n[input]\nphantom = \"neuron\"\n[embed.pso]\nparticels = 64\n";
     let folder = folder_with("typo.toml", config.as_bytes());
-    refused(&folder, &["run", "typo.toml"], 2, &["typo.toml:6", "particels", "did you mean particles?"]);
+    refused(
+        &folder,
+        &["run", "typo.toml"],
+        2,
+        &["error[E-CONFIG]", "typo.toml:6", "particels", "did you mean particles?"],
+    );
     refused(
         &folder,
         &["run", "missing.swc", "--set", "embed.pso.particels=4"],
@@ -155,14 +160,14 @@ fn wrong_usage() {
     let folder = tempfile::tempdir().expect("temporary folder");
     refused(&folder, &["run"], 2, &["Usage"]);
     refused(&folder, &["run", "x.swc", "--from", "emebd"], 2, &["emebd", "embed"]);
-    refused(&folder, &["skeleton", "a.nii.gz", "b.nii.gz", "-o", "x"], 2, &["mask"]);
+    refused(&folder, &["skeleton", "a.nii.gz", "b.nii.gz", "-o", "x"], 2, &["error[E-USAGE]", "mask"]);
 }
 
 #[test]
 fn output_folder_that_cannot_be() {
     let folder = folder_with("ok.swc", b"1 1 0 0 0 1 -1\n2 2 1 0 0 1 1\n");
     fs::write(folder.path().join("taken"), b"a file").expect("write");
-    refused(&folder, &["run", "ok.swc", "-o", "taken/run"], 73, &["taken"]);
+    refused(&folder, &["run", "ok.swc", "-o", "taken/run"], 73, &["error[E-IO-CREATE]", "taken"]);
 }
 
 #[test]
@@ -172,7 +177,7 @@ fn a_folder_at_work_is_refused() {
     fs::create_dir(&out).expect("folder");
     let lock = fs::File::create(out.join(".lock")).expect("lock file");
     lock.lock().expect("lock");
-    refused(&folder, &["run", "ok.swc", "-o", "held"], 75, &["another run"]);
+    refused(&folder, &["run", "ok.swc", "-o", "held"], 75, &["error[E-RUN-LOCKED]", "another run"]);
     drop(lock);
     assert_eq!(espalier(folder.path(), &["run", "ok.swc", "-o", "held"]).status.code(), Some(0));
 }
@@ -280,9 +285,11 @@ fn verify_prints_a_table_and_fails_where_a_claim_does() {
     let output = espalier(folder.path(), &["verify", "out", "--json"]);
     let json: String = String::from_utf8_lossy(&output.stdout).into_owned();
     assert_eq!(output.status.code(), Some(8), "{json}");
-    assert!(json.contains("\"holds\": false") && stderr(&output).contains("E-VERIFY"), "{json}");
+    assert!(json.contains("\"holds\": false") && stderr(&output).contains("error[E-VERIFY]"), "{json}");
     fs::remove_file(folder.path().join("out/nodes.tsv")).expect("remove");
     refused(&folder, &["verify", "out"], 74, &["nodes.tsv"]);
+    fs::write(folder.path().join("out/SHA256SUMS"), "no digest\n").expect("write");
+    refused(&folder, &["verify", "out"], 3, &["error[E-VERIFY-MALFORMED]", "SHA256SUMS", "line 1"]);
     refused(&folder, &["verify", "nowhere"], 74, &["SHA256SUMS"]);
 }
 
@@ -399,7 +406,12 @@ fn manual_edits() {
     refuse(
         &edit(3, 1, 40.0),
         3,
-        &["bad.json", "line 4: edits[0]: there is no branch 3: they are 0 to 2", "hint"],
+        &[
+            "error[E-FILE-INVALID]",
+            "bad.json",
+            "line 4: edits[0]: there is no branch 3: they are 0 to 2",
+            "hint",
+        ],
     );
     refuse("{ \"branch\": 1, }", 3, &["bad.json", "line 4"]);
     // Back onto the stem.
@@ -511,14 +523,24 @@ fn what_cannot_be_compared_is_refused() {
     let folder = folder_with("tree.swc", SMALL_TREE.as_bytes());
     embedded(folder.path(), "a", &[]);
     fs::create_dir(folder.path().join("empty")).expect("folder");
-    refused(&folder, &["compare", "empty", "-o", "x"], 74, &["empty holds no run", "hint", "--to embed"]);
+    refused(
+        &folder,
+        &["compare", "empty", "-o", "x"],
+        74,
+        &["error[E-COMPARE-NO-RUN]", "empty holds no run", "hint", "--to embed"],
+    );
     refused(&folder, &["compare", "nowhere", "-o", "x"], 74, &["nowhere"]);
-    refused(&folder, &["compare", "a", "-o", "a"], 2, &["a is a run folder", "hint", "-o"]);
+    refused(
+        &folder,
+        &["compare", "a", "-o", "a"],
+        2,
+        &["error[E-COMPARE-FOLDER]", "a is a run folder", "hint", "-o"],
+    );
     refused(
         &folder,
         &["compare", "a", "--set", "embed.w_angle=1", "-o", "x"],
         2,
-        &["--set embed.w_angle", "render.*"],
+        &["error[E-COMPARE-SETTINGS]", "--set embed.w_angle", "render.*"],
     );
     refused(&folder, &["compare"], 2, &["RUN|CONFIG"]);
     // A layout that was edited afterwards is found out, with or without the digests.
@@ -527,7 +549,12 @@ fn what_cannot_be_compared_is_refused() {
     fs::write(&file, text.replacen("\"crossings\":0", "\"crossings\":1", 1)).expect("write");
     refused(&folder, &["compare", "a", "-o", "x"], 8, &["a/compare.json", "SHA256SUMS"]);
     fs::remove_file(folder.path().join("a/SHA256SUMS")).expect("remove");
-    refused(&folder, &["compare", "a", "-o", "x"], 8, &["states 1 crossings, its coordinates have 0"]);
+    refused(
+        &folder,
+        &["compare", "a", "-o", "x"],
+        8,
+        &["error[E-RUN-CERTIFICATE]", "states 1 crossings, its coordinates have 0"],
+    );
     fs::remove_file(&file).expect("remove");
     refused(&folder, &["compare", "a", "-o", "x"], 74, &["there is no compare.json"]);
 }
@@ -593,7 +620,7 @@ fn a_sweep_in_vain_is_refused() {
     refuse(&["embed.w_length="], &["KEY=V1,V2"]);
     refuse(&[], &["--over"]);
     refuse(&["embed.w_length=-1,-2"], &["--set embed.w_length=-1", "must be from 0"]);
-    refuse(&["render.width_px=300,400"], &["no embedding depends on it"]);
+    refuse(&["render.width_px=300,400"], &["error[E-SWEEP]", "no embedding depends on it"]);
     refuse(&["embed.w_length=1,2", "embed.w_length=3"], &["is given twice"]);
     let many = format!("seed={}", (0..200).map(|i| i.to_string()).collect::<Vec<_>>().join(","));
     refuse(&[&many, &many.replace("seed", "views.seed_of_nothing")], &["40000 combinations", "10000"]);

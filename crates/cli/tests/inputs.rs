@@ -51,6 +51,7 @@ fn labels_go_by_the_users_own_names() {
     let (code, text) = run("left lnug");
     assert_eq!(code, Some(2), "{text}");
     assert!(text.contains("names.ctbl") && text.contains("left_lung"), "{text}");
+    assert!(text.contains("error[E-VOLUME-LABEL-UNKNOWN]"), "{text}");
     fs::write(folder.path().join("names.ctbl"), "10 left_lung\ntwenty heart\n").expect("write");
     let (code, text) = run("heart");
     assert!(code == Some(3) && text.contains("names.ctbl") && text.contains("line 2"), "{text}");
@@ -115,7 +116,7 @@ fn a_scan_is_no_map_of_regions() {
     let arguments = ["run", "map.mhd", "--label", "10", "--set", "tree.labels=scan.nrrd", "-o", "out"];
     let (code, text) = said(&folder, &[arguments.as_slice(), &["--to", "tree"]].concat());
     assert_eq!(code, Some(3), "{text}");
-    assert!(text.contains("scan.nrrd") && text.contains("no label map"), "{text}");
+    assert!(text.contains("scan.nrrd") && text.contains("error[E-VOLUME-NO-LABELS]"), "{text}");
 }
 
 #[test]

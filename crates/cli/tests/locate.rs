@@ -147,7 +147,7 @@ fn what_is_no_point_is_refused() {
         assert!(errors.contains(fragment) && output.stdout.is_empty(), "{errors}");
     };
     refused(&["run"], "", 2, "required");
-    refused(&["run", "1,2,x"], "", 2, "no number");
+    refused(&["run", "1,2,x"], "", 2, "error[E-LOCATE-POINT]");
     refused(&["run", "-1,2,nan"], "", 2, "not finite");
     refused(&["run", "1,2,3,4"], "", 2, "two or three");
     refused(&["run", "1,2,3", "--lps", "--voxel"], "", 2, "cannot be used with");
@@ -157,7 +157,7 @@ fn what_is_no_point_is_refused() {
     refused(&["nowhere", "1,2,3"], "", 74, "nowhere");
     fs::write(folder.path().join("ok.swc"), "1 1 0 0 0 1 -1\n2 2 9 0 0 1 1\n").expect("write");
     text_of(folder.path(), &["run", "ok.swc", "-o", "traced"]);
-    refused(&["traced", "1,2,3", "--voxel"], "", 2, "no mask");
+    refused(&["traced", "1,2,3", "--voxel"], "", 2, "error[E-LOCATE-SPACE]");
     fs::write(folder.path().join("traced/tree.swc"), "1 1 0 0 0 1 -1\n2 2 8 0 0 1 1\n").expect("write");
     refused(&["traced", "1,2,3"], "", 8, "SHA256SUMS");
 }

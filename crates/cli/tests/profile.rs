@@ -60,6 +60,7 @@ fn a_way_is_drawn_and_no_result_is_overwritten() {
     ] {
         let (code, text) = draw(file, more);
         assert_eq!(code, Some(2), "{file}: {text}");
+        assert!(!more.is_empty() || text.contains("error[E-PROFILE-PLOT]"), "{file}: {text}");
     }
     assert_eq!(said(folder.path(), &["verify", "run", "-q"]).0, Some(0));
 }

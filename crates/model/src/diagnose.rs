@@ -41,6 +41,35 @@ impl Class {
             Self::Locked => 75,
         }
     }
+
+    /// All classes, by exit code.
+    pub const ALL: [Self; 9] = [
+        Self::Internal,
+        Self::Usage,
+        Self::Input,
+        Self::Limit,
+        Self::Topology,
+        Self::Uncertified,
+        Self::CannotCreate,
+        Self::Io,
+        Self::Locked,
+    ];
+
+    /// What it means, as a phrase.
+    #[must_use]
+    pub fn meaning(self) -> &'static str {
+        match self {
+            Self::Internal => "a bug of ours",
+            Self::Usage => "usage or config",
+            Self::Input => "the input is malformed or holds nothing to work on",
+            Self::Limit => "over a stated limit",
+            Self::Topology => "topology refused by policy",
+            Self::Uncertified => "no certified layout, an altered file, or a claim that does not hold",
+            Self::CannotCreate => "an output cannot be created",
+            Self::Io => "a missing or unreadable file, or the disk failed",
+            Self::Locked => "another run holds the folder",
+        }
+    }
 }
 
 /// An error that names its code, its class and the way out. Its `Display` names the place and the cause.

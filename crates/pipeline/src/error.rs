@@ -260,6 +260,14 @@ pub enum Error {
         /// The run folder.
         folder: PathBuf,
     },
+    /// A code that there is not.
+    #[error("there is no code {code}")]
+    UnknownCode {
+        /// What was asked for.
+        code: String,
+        /// Codes like it.
+        nearest: Vec<String>,
+    },
     /// The threads cannot be started.
     #[error("cannot start {threads} threads: {message}")]
     Threads {
@@ -339,6 +347,7 @@ impl Diagnose for Error {
             Self::Write { .. } => "E-IO-WRITE",
             Self::Locked { .. } => "E-RUN-LOCKED",
             Self::Threads { .. } => "E-RUN-THREADS",
+            Self::UnknownCode { .. } => "E-EXPLAIN-CODE",
         }
     }
 
@@ -362,6 +371,7 @@ impl Diagnose for Error {
             | Self::NotSwept { .. }
             | Self::SweepSize { .. }
             | Self::GroupSize { .. }
+            | Self::UnknownCode { .. }
             | Self::Threads { .. } => Class::Usage,
             Self::NoRun { .. }
             | Self::NoGroup { .. }
@@ -400,6 +410,10 @@ impl Diagnose for Error {
             Self::NotSwept { .. } => "write --over KEY=V1,V2,…, such as --over embed.w_length=0.5,1,2,4".to_owned(),
             Self::SweepSize { .. } => "give fewer values, or sweep one key at a time".to_owned(),
             Self::Settled { .. } => "of a finished run only render.* can be changed; or compare its config".to_owned(),
+            Self::UnknownCode { nearest, .. } if nearest.is_empty() => "espalier explain lists all codes".to_owned(),
+            Self::UnknownCode { nearest, .. } => {
+                format!("did you mean {}? espalier explain lists all codes", nearest.join(" or "))
+            }
             Self::MissingArtifact { .. } => "start from an earlier stage with --from, or name the file".to_owned(),
             Self::Altered { .. } => {
                 "run the stage that makes it again; or, if the edit is meant, give the file to the stage's own \

@@ -16,6 +16,7 @@
 //! | how a result came about, what each method cost, why a run stopped | `provenance`, `methods`, `failure` |
 //! | the page of a run: what it is made from | `page` |
 //! | what the columns of the tables mean | `dictionary` |
+//! | what each error and warning code means | [`mod@explain`] |
 //! | a point of the scan on the map, and back | [`mod@locate`] |
 //! | the calibre on the way to a place, as a table or a plot | [`profile()`], [`plot_profile`] |
 //! | a run folder held against itself | [`verify()`] |
@@ -32,6 +33,7 @@ pub mod config;
 mod dictionary;
 mod error;
 mod event;
+pub mod explain;
 mod failure;
 mod folder;
 pub mod group;
@@ -64,6 +66,7 @@ pub use espalier_render::ChangeOf;
 pub use espalier_verify::{Check, Outcome};
 pub use espalier_volume::is_dicom_folder;
 pub use event::Event;
+pub use explain::{catalogue, explain};
 pub use group::{GroupRequest, Grouped, group};
 pub use juxtapose::{JuxtaposeRequest, JuxtaposedRuns, juxtapose};
 pub use locate::{Given, Located, Space, locate, read_point, read_points};

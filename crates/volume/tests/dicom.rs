@@ -280,6 +280,44 @@ fn what_is_refused() {
     assert_eq!(dicom_error(read(empty.path(), &ReadOptions::default())).code(), "E-DICOM-NONE");
 }
 
+/// The data set of a slice under another transfer syntax, with these pixels.
+fn recoded(syntax: &str, pixels: &[u8]) -> Vec<u8> {
+    let plain = Slice::at(0.0).bytes();
+    let n_pixel_bytes = 8 + 4 + 60;
+    // Behind the preamble, its mark, and the element of the syntax of 8 and 20 bytes.
+    let data_set = &plain[128 + 4 + 28..plain.len() - n_pixel_bytes];
+    let meta = slices::element(0x0002_0010, "UI", syntax.as_bytes().to_vec());
+    let tag = [0xE0, 0x7F, 0x10, 0x00, b'O', b'B', 0, 0, 0xFF, 0xFF, 0xFF, 0xFF];
+    [&plain[..132], &meta, data_set, &tag, pixels].concat()
+}
+
+#[test]
+fn what_cannot_be_decoded_is_refused() {
+    let code_of_file = |bytes: &[u8]| {
+        let folder = scratch();
+        let path = folder.path().join("slice.dcm");
+        std::fs::write(&path, bytes).expect("writable");
+        dicom_error(read(&path, &ReadOptions::default())).code()
+    };
+    assert_eq!(code_of_file(&recoded("1.2.840.10008.1.2.4.100", &[])), "E-DICOM-SYNTAX");
+    let item =
+        |bytes: &[u8]| [&[0xFE, 0xFF, 0x00, 0xE0][..], &(bytes.len() as u32).to_le_bytes(), bytes].concat();
+    let end = [0xFE, 0xFF, 0xDD, 0xE0, 0, 0, 0, 0];
+    let junk = [item(&[]), item(b"no image in here"), end.to_vec()].concat();
+    let two: Vec<Vec<u8>> = [0.0, 1.0].iter().map(|_| recoded("1.2.840.10008.1.2.4.80", &junk)).collect();
+    let folder = scratch();
+    for (index, bytes) in two.iter().enumerate() {
+        let height = format!("-20\\-30\\{index}");
+        let moved = String::from_utf8_lossy(b"-20\\-30\\0").into_owned();
+        let at = bytes.windows(moved.len()).position(|window| window == moved.as_bytes()).expect("a place");
+        let mut bytes = bytes.clone();
+        bytes[at..at + height.len()].copy_from_slice(height.as_bytes());
+        std::fs::write(folder.path().join(index.to_string()), bytes).expect("writable");
+    }
+    assert_eq!(dicom_error(read(folder.path(), &ReadOptions::default())).code(), "E-DICOM-PIXELS");
+    assert_eq!(code_of_file(&Slice::at(0.0).bytes()[..400]), "E-DICOM-DAMAGED");
+}
+
 /// Mutants of a series, one file of it changed each time: no panic, and nothing beyond the limit.
 #[test]
 fn mutants_never_panic() {
