@@ -102,7 +102,7 @@ pub enum Method {
     Marino,
     /// The paper's particle swarm.
     Pso,
-    /// Ours: mirror search, untangling, coordinate descent and a barrier method in turn.
+    /// Ours: mirror search, untangling, a barrier method and coordinate descent.
     #[default]
     Solver,
 }

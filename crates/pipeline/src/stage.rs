@@ -116,7 +116,8 @@ impl Stage {
     pub(crate) fn version(self) -> u32 {
         match self {
             Self::Phantom | Self::Skeleton | Self::Views => 1,
-            Self::Volume | Self::Radius | Self::Tree | Self::Embed | Self::Render | Self::Report => 2,
+            Self::Volume | Self::Radius | Self::Tree | Self::Render | Self::Report => 2,
+            Self::Embed => 3,
         }
     }
 

@@ -10,7 +10,7 @@
 
 use super::shape::Shape;
 use super::work::Work;
-use super::{Run, untangling};
+use super::{Descents, Run, untangling};
 use crate::certify::certify;
 use crate::layout::cone;
 use crate::params::Params;
@@ -46,7 +46,7 @@ pub(crate) fn repair(problem: &Problem, start: Shape, params: &Params) -> Repair
     let mut run = Run::new(problem, &params.solver, shape);
     // As in the schedule: where nothing is lost there is nothing to do.
     if run.shape.loss(problem) > 0.0 && n_crossings(problem, &run.shape) == 0 {
-        run.improve(&Separation::new(problem, params.solver.clearance));
+        run.improve(&Separation::new(problem, params.solver.clearance), Descents::BetweenBarriers);
     }
     Repaired { work: work.done + run.work.done, is_spent: run.work.is_spent(), shape: run.shape }
 }
