@@ -149,3 +149,19 @@ fn space_and_volume_have_options_of_their_own() {
     assert_eq!(run(&["--volume-index", "0", "--assume-space", "sar"]).0, Some(2));
     assert_eq!(run(&["--volume-index", "0", "--assume-space", "las", "--strict"]).0, Some(0));
 }
+
+#[test]
+fn a_tracing_of_no_neurons_size_is_told() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let tracing = |length: f64, radius: f64| format!("1 1 0 0 0 {radius} -1\n2 3 {length} 0 0 {radius} 1\n");
+    let warns = |swc: String, settings: &[&str]| {
+        fs::write(folder.path().join("traced.swc"), swc).expect("write");
+        let (code, text) = said(&folder, &[&["tree", "traced.swc", "-o", "out"], settings].concat());
+        assert_eq!(code, Some(0), "{text}");
+        text.contains("W-SWC-UNIT")
+    };
+    assert!(!warns(tracing(9000.0, 5.0), &[]), "a neuron");
+    assert!(warns(tracing(120_000.0, 5.0), &[]), "12 cm across");
+    assert!(warns(tracing(9000.0, 40.0), &[]), "voxels of 8 nm");
+    assert!(!warns(tracing(9000.0, 40.0), &["--set", "input.unit=nm", "--set", "input.scale=[8,8,8]"]));
+}

@@ -30,6 +30,8 @@ impl Publication {
         let number = field("number").map(|number| format!("({number})")).unwrap_or_default();
         let pages = field("pages").map(|pages| format!(", {}", pages.replace("--", "–"))).unwrap_or_default();
         let authors = self.authors.replace(" and ", ", ");
+        // Initials end with the full stop already.
+        let authors = authors.trim_end_matches('.');
         format!("{authors}. {}. {}{volume}{number}{pages}, {}.", self.title, self.venue.1, self.year)
     }
 
@@ -47,7 +49,7 @@ impl Publication {
 
 const TVCG: (&str, &str) = ("journal", "IEEE Transactions on Visualization and Computer Graphics");
 
-const ALL: [Publication; 14] = [
+const ALL: [Publication; 15] = [
     Publication {
         key: "Hu2022",
         kind: "article",
@@ -67,6 +69,16 @@ const ALL: [Publication; 14] = [
         venue: TVCG,
         place: &[("volume", "22"), ("number", "1"), ("pages", "906--915")],
         year: "2016",
+    },
+    Publication {
+        key: "Kanitsar2002",
+        kind: "inproceedings",
+        short: "Kanitsar et al. 2002",
+        authors: "Kanitsar, A. and Fleischmann, D. and Wegenkittl, R. and Felkel, P. and Gröller, E.",
+        title: "CPR – curved planar reformation",
+        venue: ("booktitle", "IEEE Visualization"),
+        place: &[("pages", "37--44")],
+        year: "2002",
     },
     Publication {
         key: "Lee94",

@@ -53,21 +53,7 @@ fn segmentation(facts: &Facts<'_>) -> Vec<String> {
     if !ran("volume") {
         return sentences;
     }
-    let is_airway = facts.setting("volume.preset") == Some("airway");
-    let method = facts.setting("volume.method").unwrap_or("auto");
-    if is_airway || method == "region-grow" {
-        sentences.push("The mask was grown from a seed over 6-connected voxels within a band of intensities [Adams1994].".into());
-        if is_airway {
-            sentences.push("The seed was found in the trachea, and the threshold is the last before the region leaks through the wall [Mori1996].".into());
-        }
-        if let Some(threshold) = facts.count("volume", "stable_threshold") {
-            sentences.push(format!("The threshold used was {}.", number(threshold, 5)));
-        }
-    } else if method == "threshold" {
-        sentences.push("The mask is a band of intensities.".to_owned());
-    } else {
-        sentences.push("The mask was taken from the input.".to_owned());
-    }
+    sentences.extend(selection(facts));
     if let Some(voxels) = facts.count("volume", "foreground_voxels") {
         let millilitres = facts.count("volume", "foreground_ml").unwrap_or(f64::NAN);
         sentences.push(format!(
@@ -75,6 +61,39 @@ fn segmentation(facts: &Facts<'_>) -> Vec<String> {
             number(voxels, 12),
             number(millilitres, 4)
         ));
+    }
+    sentences
+}
+
+/// How the voxels were chosen.
+fn selection(facts: &Facts<'_>) -> Vec<String> {
+    let count = |name| facts.count("volume", name);
+    let setting = |key| facts.setting(key).filter(|&value| value != "not set");
+    let end = |name, key| count(name).or_else(|| setting(key)?.parse().ok());
+    let band = match (end("band_lower", "volume.lower"), end("band_upper", "volume.upper")) {
+        (Some(lower), Some(upper)) => format!("from {} to {}", number(lower, 5), number(upper, 5)),
+        (Some(lower), None) => format!("from {} on", number(lower, 5)),
+        (None, Some(upper)) => format!("up to {}", number(upper, 5)),
+        (None, None) if setting("volume.label").is_some() => {
+            return vec!["The mask is one or more labels of a label map.".to_owned()];
+        }
+        (None, None) => return vec!["The mask was taken from the input.".to_owned()],
+    };
+    let was_found = count("seed_candidates").is_some();
+    let is_given = ["volume.seed_voxel", "volume.seed_mm"].into_iter().any(|key| setting(key).is_some());
+    if !was_found && !is_given {
+        return vec![format!("The mask is all voxels with values {band}.")];
+    }
+    let mut sentences = vec![format!(
+        "The mask was grown from a seed over 6-connected voxels with values {band} [Adams1994]."
+    )];
+    if was_found {
+        sentences.push("The seed was found in the trachea.".to_owned());
+    }
+    if count("stable_threshold").is_some() && setting("volume.lower").or(setting("volume.upper")).is_none() {
+        sentences.push(
+            "The threshold is the last before the region leaks through the wall [Mori1996].".to_owned(),
+        );
     }
     sentences
 }
@@ -153,7 +172,31 @@ fn embedding(facts: &Facts<'_>) -> Vec<String> {
         degrees(losses.angle3d_error_mean_deg),
         degrees(losses.angle3d_error_max_deg)
     ));
+    sentences.extend(picture(facts));
     sentences
+}
+
+/// What the picture shows beside the tree.
+fn picture(facts: &Facts<'_>) -> Option<String> {
+    let setting = |key| facts.setting(key).unwrap_or_default();
+    if setting("render.style") != "volume" {
+        return None;
+    }
+    let slab_mm: f64 = setting("render.volume.slab_mm").parse().unwrap_or(0.0);
+    let gathered = match setting("render.volume.slab") {
+        "mip" => "largest value",
+        "minip" => "smallest value",
+        _ => "mean",
+    };
+    let slab = if slab_mm > 0.0 {
+        format!("the {gathered} over a slab of {} mm", number(slab_mm, 4))
+    } else {
+        "trilinear between voxels".to_owned()
+    };
+    Some(format!(
+        "The picture shows the scan along the branches, {slab}: a curved planar reformation [Kanitsar2002] of the whole \
+         tree at once."
+    ))
 }
 
 fn method_sentence(method: &str) -> String {

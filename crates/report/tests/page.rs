@@ -289,6 +289,53 @@ fn what_is_missing_is_said() {
 }
 
 #[test]
+fn the_methods_say_how_the_mask_was_chosen() {
+    let run = Run::of(tree(60, 9), "x");
+    let written = |counts: &[(&str, f64)], settings: &[(&str, &str)]| {
+        let mut facts = run.whole();
+        facts.stages[0].counts.extend(counts.iter().map(|&(name, value)| (name.to_owned(), value)));
+        facts.settings.extend(settings.iter().map(|&(key, value)| Setting {
+            key: key.to_owned(),
+            value: value.to_owned(),
+            default: None,
+        }));
+        report(&facts, &Params::default()).expect("a page").methods
+    };
+    let cases = [
+        (written(&[], &[]), "The mask was taken from the input."),
+        (written(&[], &[("volume.label", "3")]), "The mask is one or more labels of a label map."),
+        (
+            written(&[], &[("volume.lower", "150"), ("volume.upper", "not set")]),
+            "all voxels with values from 150 on.",
+        ),
+        (written(&[("band_lower", 150.0)], &[]), "all voxels with values from 150 on."),
+        (
+            written(&[("band_upper", -863.0), ("seed_candidates", 3.0), ("stable_threshold", -863.0)], &[]),
+            "with values up to -863 [@Adams1994]. The seed was found in the trachea. The threshold is the last before",
+        ),
+        (
+            written(&[("band_lower", 1.0), ("band_upper", 2.0)], &[("volume.seed_voxel", "[1, 2, 3]")]),
+            "grown from a seed over 6-connected voxels with values from 1 to 2 [@Adams1994].",
+        ),
+        (
+            written(
+                &[],
+                &[
+                    ("render.style", "\"volume\""),
+                    ("render.volume.slab_mm", "3.0"),
+                    ("render.volume.slab", "\"mip\""),
+                ],
+            ),
+            "the largest value over a slab of 3 mm: a curved planar reformation [@Kanitsar2002]",
+        ),
+    ];
+    for (text, expected) in cases {
+        assert!(text.contains(expected), "{expected}\n{text}");
+        assert!(!text.contains(".. "), "{text}");
+    }
+}
+
+#[test]
 fn a_single_node_and_a_single_branch_have_a_page() {
     for n_nodes in [1, 2, 5] {
         let run = Run::of(tree(n_nodes, 1000), "x");

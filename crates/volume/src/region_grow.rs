@@ -43,7 +43,9 @@ pub(crate) fn grow(volume: &Volume, params: &Params) -> Result<Selection, Error>
     let (growth, band) = choose_band(volume, params, seed, &mut report)?;
     let bits = region(volume, seed, band)?;
     let what = format!("the region in {} to {}", band.0, band.1);
-    Ok(Selection { report, growth, seeds, ..Selection::of_scan(bits, what) })
+    let mut selection = Selection { growth, seeds, ..Selection::of_scan(bits, band, what) };
+    selection.report.extend(report);
+    Ok(selection)
 }
 
 /// The seed of the parameters, else the trachea.

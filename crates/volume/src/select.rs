@@ -36,9 +36,15 @@ impl Selection {
         Self { bits, what: what.into(), is_of_scan: false, report, growth: None, seeds: Vec::new() }
     }
 
-    /// The same of voxels that intensities have chosen.
-    pub(crate) fn of_scan(bits: Bits, what: impl Into<String>) -> Self {
-        Self { is_of_scan: true, ..Self::of(bits, what) }
+    /// The same of voxels that a scan's intensities have chosen; an open end of the band is not counted.
+    pub(crate) fn of_scan(bits: Bits, (lower, upper): (f64, f64), what: impl Into<String>) -> Self {
+        let mut selection = Self { is_of_scan: true, ..Self::of(bits, what) };
+        for (name, end) in [("band_lower", lower), ("band_upper", upper)] {
+            if end.is_finite() {
+                selection.report.count(name, end);
+            }
+        }
+        selection
     }
 }
 
@@ -85,7 +91,7 @@ fn select_by_preset(volume: &Volume, preset: Preset, params: &Params) -> Result<
     let lower = params.lower.unwrap_or(VESSEL_FROM_HU);
     let upper = params.upper.unwrap_or(f64::INFINITY);
     let bits = choose(volume, |value| (lower..=upper).contains(&value));
-    let mut selection = Selection::of_scan(bits, format!("the band {lower} to {upper}"));
+    let mut selection = Selection::of_scan(bits, (lower, upper), format!("the band {lower} to {upper}"));
     let message = format!("preset \"vessel\" without a seed: all from {lower} on, bone as well as vessels");
     selection.report.warn("W-VOLUME-PRESET", message);
     Ok(selection)
