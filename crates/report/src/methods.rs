@@ -140,12 +140,10 @@ fn embedding(facts: &Facts<'_>) -> Vec<String> {
         _ => "Views of the whole and of its parts were chosen by how little they foreshorten, after a published metric [Hu2022].".to_owned(),
     }];
     sentences.push(method_sentence(&embedding.method));
-    let others: Vec<&str> = embedding
-        .methods
-        .iter()
-        .map(|row| row.method.as_str())
-        .filter(|method| *method != embedding.method)
-        .collect();
+    let others = embedding.methods.iter().map(|row| row.method.as_str());
+    let mut others: Vec<&str> = others.filter(|method| *method != embedding.method).collect();
+    // The swarm may stand there for several kinds of targets.
+    others.dedup();
     if !others.is_empty() {
         let has = |name: &str| others.iter().any(|method| method.starts_with(name));
         let marino = if has("marino") { " Marino is a reconstruction of [Marino2015]." } else { "" };
