@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use espalier_model::{Embedding, Tree, swc};
-use espalier_pipeline::{Config, Error, Event, Loaded, Override, Request, Stage, Summary};
+use espalier_pipeline::{Cache, Config, Error, Event, Loaded, Override, Request, Stage, Summary};
 
 /// The folder of real data; `None`, and a line that says so, where `ESPALIER_DATA` is not set.
 ///
@@ -83,6 +83,26 @@ pub fn run_seen(source: &Path, out: &Path, overrides: &[Override]) -> Result<(Su
     Ok((summary, done.into_inner().unwrap_or_default()))
 }
 
+/// As [`run_seen`], with a store that runs share: also the stages whose results were taken from there.
+///
+/// # Errors
+/// As the run's.
+pub fn run_sharing(
+    source: &Path,
+    out: &Path,
+    overrides: &[Override],
+    cache: &Cache,
+) -> Result<(Summary, Vec<Stage>, Vec<Stage>), Error> {
+    let (done, taken) = (Mutex::new(Vec::new()), Mutex::new(Vec::new()));
+    let request = Request { cache: Some(cache.clone()), ..request(source, out, overrides, 2)? };
+    let summary = espalier_pipeline::run(&request, &|event| match event {
+        Event::Finished { stage, .. } => done.lock().into_iter().for_each(|mut done| done.push(stage)),
+        Event::Taken { stage, .. } => taken.lock().into_iter().for_each(|mut taken| taken.push(stage)),
+        _ => {}
+    })?;
+    Ok((summary, done.into_inner().unwrap_or_default(), taken.into_inner().unwrap_or_default()))
+}
+
 fn request(source: &Path, out: &Path, overrides: &[Override], threads: usize) -> Result<Request, Error> {
     let is_config = source.extension().is_some_and(|extension| extension == "toml");
     let config = if is_config {
@@ -103,6 +123,7 @@ fn request(source: &Path, out: &Path, overrides: &[Override], threads: usize) ->
         threads: Some(threads),
         max_memory_bytes: 4 << 30,
         data_dir: None,
+        cache: None,
     })
 }
 

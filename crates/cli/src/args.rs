@@ -88,6 +88,14 @@ pub(crate) struct Common {
     /// The most memory that reading a file may take, such as 4G [default: half of the machine's]
     #[arg(long, global = true, value_name = "SIZE", value_parser = parse_size)]
     pub(crate) max_memory: Option<u64>,
+    /// Share results between runs that agree: what another run has made from the same files and settings is copied from
+    /// this folder, and what this one makes is stored there [default: $ESPALIER_CACHE, else none]; it may be removed at any
+    /// time
+    #[arg(long, global = true, value_name = "DIR")]
+    pub(crate) cache: Option<PathBuf>,
+    /// How large that folder may be after a run; what was used least lately goes first
+    #[arg(long, global = true, value_name = "SIZE", default_value = "20G", value_parser = parse_size)]
+    pub(crate) cache_size: u64,
     /// Print results and errors only
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,

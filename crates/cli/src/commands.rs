@@ -11,7 +11,7 @@ use clap::CommandFactory;
 use espalier_model::Diagnose;
 use espalier_model::diagnose::Class;
 use espalier_pipeline::{
-    Align, Artifact, ChangeOf, CompareRequest, Config, Error, GroupRequest, JuxtaposeParams,
+    Align, Artifact, Cache, ChangeOf, CompareRequest, Config, Error, GroupRequest, JuxtaposeParams,
     JuxtaposeRequest, Loaded, Override, Plan, PlotRequest, Plotted, Reason, Request, SideFile, Space, Stage,
     Subject, Summary, SweepRequest, WayTo,
 };
@@ -196,10 +196,11 @@ fn pipeline_request(arguments: &Arguments, run: &RunArguments) -> anyhow::Result
 
 /// Prints which stages a run would do, and why.
 fn print_plan(arguments: &Arguments, run: &RunArguments) -> anyhow::Result<()> {
-    for Plan { stage, reason } in espalier_pipeline::plan(&pipeline_request(arguments, run)?)? {
+    for Plan { stage, reason, is_shared } in espalier_pipeline::plan(&pipeline_request(arguments, run)?)? {
         let text = match reason {
             None => "kept".to_owned(),
             Some(reason @ Reason::After { .. }) => format!("to do if that changes: {reason}"),
+            Some(reason) if is_shared => format!("to copy from the cache: {reason}"),
             Some(reason) => format!("to do: {reason}"),
         };
         progress::result(&format!("{stage:<9} {text}"));
@@ -217,6 +218,7 @@ fn run_compare(arguments: &Arguments, compare: &CompareArguments) -> anyhow::Res
         threads: arguments.common.threads.map(usize::from),
         max_memory_bytes: arguments.common.max_memory.unwrap_or_else(half_of_memory),
         data_dir: data_dir(),
+        cache: cache(arguments),
     };
     let progress = Progress::new(arguments.common.quiet);
     let compared = espalier_pipeline::compare(&request, &|event| progress.show(event))?;
@@ -246,6 +248,7 @@ fn run_juxtapose(arguments: &Arguments, juxtapose: &JuxtaposeArguments) -> anyho
         threads: arguments.common.threads.map(usize::from),
         max_memory_bytes: arguments.common.max_memory.unwrap_or_else(half_of_memory),
         data_dir: data_dir(),
+        cache: cache(arguments),
     };
     let progress = Progress::new(arguments.common.quiet);
     let compared = espalier_pipeline::juxtapose(&request, &|event| progress.show(event))?;
@@ -262,6 +265,7 @@ fn run_sweep(arguments: &Arguments, sweep: &SweepArguments) -> anyhow::Result<Su
         threads: arguments.common.threads.map(usize::from),
         max_memory_bytes: arguments.common.max_memory.unwrap_or_else(half_of_memory),
         data_dir: data_dir(),
+        cache: cache(arguments),
     };
     let progress = Progress::new(arguments.common.quiet);
     let swept = espalier_pipeline::sweep(&request, &|event| progress.show(event))?;
@@ -405,6 +409,7 @@ fn request(arguments: &Arguments, loaded: Loaded, out: PathBuf) -> Request {
         threads: arguments.common.threads.map(usize::from),
         max_memory_bytes: arguments.common.max_memory.unwrap_or_else(half_of_memory),
         data_dir: data_dir(),
+        cache: cache(arguments),
     }
 }
 
@@ -426,6 +431,15 @@ fn load_input(path: &Path, overrides: &[Override]) -> anyhow::Result<Loaded> {
 #[allow(clippy::disallowed_methods, reason = "the command line is where the environment is read")]
 fn data_dir() -> Option<PathBuf> {
     std::env::var_os("ESPALIER_DATA").map(PathBuf::from)
+}
+
+/// The store that runs share: none unless somebody has said where it lies.
+#[allow(clippy::disallowed_methods, reason = "the command line is where the environment is read")]
+fn cache(arguments: &Arguments) -> Option<Cache> {
+    let named = arguments.common.cache.clone();
+    let folder = named.or_else(|| std::env::var_os("ESPALIER_CACHE").map(PathBuf::from))?;
+    let max_bytes = arguments.common.cache_size;
+    (!folder.as_os_str().is_empty()).then_some(Cache { folder, max_bytes })
 }
 
 /// Half of the machine's memory.

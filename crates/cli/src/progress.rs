@@ -47,7 +47,11 @@ impl Progress {
     pub(crate) fn show(&self, event: Event) {
         if let (
             true,
-            Event::Started { .. } | Event::Progress { .. } | Event::Finished { .. } | Event::Kept { .. },
+            Event::Started { .. }
+            | Event::Progress { .. }
+            | Event::Finished { .. }
+            | Event::Kept { .. }
+            | Event::Taken { .. },
         ) = (self.is_quiet, &event)
         {
             return;
@@ -85,6 +89,10 @@ impl Progress {
             Event::Kept { stage, line: text } => {
                 finish(&mut bar);
                 line(&format!("{stage:<9}    kept  {text}"));
+            }
+            Event::Taken { stage, line: text } => {
+                finish(&mut bar);
+                line(&format!("{stage:<9}  shared  {text}"));
             }
             Event::Combination { done, total, line: text } => {
                 finish(&mut bar);

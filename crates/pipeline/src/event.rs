@@ -54,6 +54,13 @@ pub enum Event {
         /// What it did when they were made, as a phrase.
         line: String,
     },
+    /// A stage's results were taken from the store that runs share.
+    Taken {
+        /// The stage.
+        stage: Stage,
+        /// What it did when they were made, as a phrase.
+        line: String,
+    },
     /// A combination of a sweep is done.
     Combination {
         /// Which, from 1.

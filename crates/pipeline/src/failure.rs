@@ -15,7 +15,7 @@ use espalier_model::diagnose::Class;
 use crate::error::Error;
 use crate::folder::RunFolder;
 
-const FILE: &str = "provenance/failure.json";
+pub(crate) const FILE: &str = "provenance/failure.json";
 const FORMAT: &str = "espalier-failure";
 const VERSION: u32 = 1;
 

@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 use crate::error::Error;
 use crate::lock::{Lock, Patience};
 
-const DIGEST_FILE: &str = "SHA256SUMS";
+pub(crate) const DIGEST_FILE: &str = "SHA256SUMS";
 
 /// A run folder, held by this process alone while the value lives.
 pub(crate) struct RunFolder {
@@ -53,6 +53,23 @@ impl RunFolder {
             reads: Mutex::default(),
             made: Vec::new(),
             _lock: None,
+        }
+    }
+
+    /// Removes what runs that were killed have left half-written of these files.
+    pub(crate) fn remove_leftovers(&self, files: &[String]) {
+        let paths: Vec<PathBuf> = files.iter().map(|file| self.path.join(file)).collect();
+        let folders: BTreeSet<&Path> = paths.iter().filter_map(|path| path.parent()).collect();
+        let entries = folders.into_iter().filter_map(|folder| fs::read_dir(folder).ok()).flatten().flatten();
+        for entry in entries {
+            let whole = entry
+                .file_name()
+                .to_str()
+                .and_then(name_of_leftover)
+                .map(|name| entry.path().with_file_name(name));
+            if whole.is_some_and(|whole| paths.contains(&whole)) {
+                let _ = fs::remove_file(entry.path());
+            }
         }
     }
 
@@ -226,6 +243,12 @@ pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Error> {
         AtomicWriteFile::open(path).map_err(|source| Error::Create { path: path.to_owned(), source })?;
     file.write_all(bytes).map_err(write)?;
     file.commit().map_err(write)
+}
+
+/// The name that a file would have got, from that under which `atomic_write_file` writes it: `.NAME.XXXXXX`.
+fn name_of_leftover(name: &str) -> Option<&str> {
+    let (name, random) = name.strip_prefix('.')?.rsplit_once('.')?;
+    (random.len() == 6 && random.bytes().all(|byte| byte.is_ascii_alphanumeric())).then_some(name)
 }
 
 fn is_absent(error: &io::Error) -> bool {

@@ -21,6 +21,7 @@ use espalier_model::{
 use espalier_render::ChangeOf;
 
 use crate::artifacts::{Artifacts, Lookup, SOURCE_KEY, SOURCE_SCAN, SOURCE_TRACING};
+use crate::cache::Cache;
 use crate::compare::{Files, Place, Subject, figure, names};
 use crate::config::{Config, Override};
 use crate::error::Error;
@@ -55,6 +56,8 @@ pub struct JuxtaposeRequest {
     pub max_memory_bytes: u64,
     /// As in [`Request`].
     pub data_dir: Option<PathBuf>,
+    /// As in [`Request`].
+    pub cache: Option<Cache>,
 }
 
 /// What a juxtaposition came to.
@@ -95,6 +98,7 @@ pub fn juxtapose(
             threads: request.threads,
             max_memory_bytes: request.max_memory_bytes,
             data_dir: request.data_dir.clone(),
+            cache: request.cache.clone(),
         };
         folders.push(subject.folder(place, events)?);
     }

@@ -13,6 +13,7 @@
 //! | one page over many runs | [`group`](mod@group) |
 //! | the run folder: atomic files, digests; one run at a time | `folder`, `lock` |
 //! | what a stage's results were made from, and whether they still stand | `record` |
+//! | results that runs share | `cache` |
 //! | how a result came about, what each method cost, why a run stopped | `provenance`, `methods`, `failure` |
 //! | the page of a run: what it is made from | `page` |
 //! | what the columns of the tables mean | `dictionary` |
@@ -27,6 +28,7 @@
 //! **Architecture Invariant:** nothing is printed here; the caller is told by [`Event`]s.
 
 mod artifacts;
+mod cache;
 mod clock;
 pub mod compare;
 pub mod config;
@@ -58,6 +60,7 @@ pub mod sweep;
 mod tree_outputs;
 mod verify;
 
+pub use cache::Cache;
 pub use compare::{CompareRequest, Compared, Subject, compare};
 pub use config::{Config, ConfigError, Loaded, Override};
 pub use error::{Error, NotSwept};

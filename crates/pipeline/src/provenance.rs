@@ -16,9 +16,19 @@ use crate::settings;
 use crate::side_file::SideFile;
 use crate::stage::Stage;
 
+/// How a stage's results came to a folder.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum How {
+    /// They were made.
+    Made,
+    /// They were taken from the store that runs share.
+    Shared,
+}
+
 /// What one stage cost.
 pub(crate) struct StageCost {
     pub(crate) stage: Stage,
+    pub(crate) how: How,
     pub(crate) seconds: f64,
     pub(crate) peak_mb: Option<f64>,
     /// The same of its parts, where it has any.
@@ -54,6 +64,8 @@ pub(crate) const TIMING_COLUMNS: [Column; 4] = [
 pub(crate) const INPUTS_FILE: &str = "provenance/inputs.tsv";
 /// What of `provenance/` is the same for equal runs, and no stage's own.
 pub(crate) const FILES: [&str; 2] = [INPUTS_FILE, settings::FILE];
+/// What of it is of this machine and this hour.
+pub(crate) const FILES_ASIDE: [&str; 2] = [RUN_FILE, TIMINGS_FILE];
 const RUN_FILE: &str = "provenance/run.json";
 const TIMINGS_FILE: &str = "provenance/timings.tsv";
 /// The role of the input in `provenance/inputs.tsv`.
@@ -179,9 +191,11 @@ struct RunRecord<'a> {
     #[serde(flatten)]
     side_files: BTreeMap<&'static str, String>,
     stages: Vec<&'static str>,
+    /// Those of them whose results were taken from the store that runs share.
+    shared: Vec<&'static str>,
     threads: usize,
     finished_unix_seconds: u64,
-    sha256_of_sums: &'a str,
+    sha256_of_sums: String,
 }
 
 /// Writes what depends on this machine and this hour: `provenance/run.json` and `provenance/timings.tsv`.
@@ -190,8 +204,10 @@ pub(crate) fn write_run(
     config: &Config,
     (input, side_paths): (Option<&Path>, &BTreeMap<SideFile, PathBuf>),
     costs: &[StageCost],
-    digest: &str,
 ) -> Result<(), Error> {
+    let names = |counts: fn(&StageCost) -> bool| {
+        costs.iter().filter(|cost| counts(cost)).map(|cost| cost.stage.name()).collect()
+    };
     let record = RunRecord {
         format: "espalier-run",
         version: 1,
@@ -204,10 +220,11 @@ pub(crate) fn write_run(
             .iter()
             .filter_map(|(side, path)| Some((side.role(), absolute(path)?)))
             .collect(),
-        stages: costs.iter().map(|cost| cost.stage.name()).collect(),
+        stages: names(|_| true),
+        shared: names(|cost| cost.how == How::Shared),
         threads: rayon::current_num_threads(),
         finished_unix_seconds: clock::unix_seconds(),
-        sha256_of_sums: digest,
+        sha256_of_sums: folder.digest_of(|_| true),
     };
     let json = serde_json::to_string_pretty(&record).unwrap_or_default() + "\n";
     folder.write_aside(RUN_FILE, json.as_bytes())?;

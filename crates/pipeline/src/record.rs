@@ -134,6 +134,15 @@ impl Record {
         &self.files
     }
 
+    /// The digest of what they were made from.
+    pub(crate) fn key(&self) -> &str {
+        &self.key
+    }
+
+    pub(crate) fn made_from(&self) -> &MadeFrom {
+        &self.made_from
+    }
+
     /// The record of a stage's results as they lie in the folder, if they are just what would be made again.
     ///
     /// # Errors
@@ -163,7 +172,7 @@ impl Record {
 
     /// A record that says what it can know of: of this stage, its key that of what it was made from, its files those
     /// that the stage may write.
-    fn parsed(stage: Stage, bytes: &[u8]) -> Option<Self> {
+    pub(crate) fn parsed(stage: Stage, bytes: &[u8]) -> Option<Self> {
         let record: Self = serde_json::from_slice(bytes).ok()?;
         let is_own = record.format == FORMAT && record.version == VERSION && record.stage == stage.name();
         let may_write = stage.writes();

@@ -6,14 +6,15 @@ use std::path::{Path, PathBuf};
 use espalier_model::Diagnose;
 
 use crate::artifacts::Artifacts;
+use crate::cache::{Cache, Taken};
 use crate::clock::Stopwatch;
 use crate::config::{Config, Loaded, Source, Unit};
 use crate::error::Error;
 use crate::event::Event;
 use crate::failure;
-use crate::folder::{RunFolder, hex_digest};
+use crate::folder::{DIGEST_FILE, RunFolder, hex_digest};
 use crate::lock::Patience;
-use crate::provenance::{self, StageCost};
+use crate::provenance::{self, How, StageCost};
 use crate::record::{MadeFrom, Reason, Record};
 use crate::scan_of_map;
 use crate::settings::Settings;
@@ -44,6 +45,8 @@ pub struct Request {
     pub max_memory_bytes: u64,
     /// What `$ESPALIER_DATA` stands for.
     pub data_dir: Option<PathBuf>,
+    /// Results that runs share, if they do.
+    pub cache: Option<Cache>,
 }
 
 /// What a run came to.
@@ -85,8 +88,12 @@ fn run_stages(request: &Request, events: &(dyn Fn(Event) + Sync)) -> Result<Summ
     let patience = if request.wait { Patience::Wait(&say_so) } else { Patience::None };
     let mut folder = RunFolder::open_or_wait(&request.out, patience)?;
     folder.forget_unless(is_known);
+    folder.remove_leftovers(&every_file());
     failure::clear(&folder);
     let done = run.perform(&mut folder, &stages);
+    if let (Some(cache), true) = (&request.cache, run.has_stored) {
+        cache.make_room();
+    }
     if let Err(error) = &done {
         if folder.is_unused() {
             folder.remove();
@@ -133,6 +140,8 @@ fn prepare<'a>(
         foreign: Vec::new(),
         kept: Vec::new(),
         costs: Vec::new(),
+        has_stored: false,
+        is_store_lost: false,
     };
     Ok((run, stages))
 }
@@ -144,6 +153,8 @@ pub struct Plan {
     pub stage: Stage,
     /// Why it would be done; none if its results stand.
     pub reason: Option<Reason>,
+    /// Whether its results would be taken from the store that runs share.
+    pub is_shared: bool,
 }
 
 /// What a run would do, stage by stage; nothing is written and nothing is locked.
@@ -159,14 +170,16 @@ pub fn plan(request: &Request) -> Result<Vec<Plan>, Error> {
     let mut planned: Vec<Plan> = Vec::new();
     for stage in stages {
         let before = planned.iter().rev().find(|plan| plan.reason.is_some() && stage.follows(plan.stage));
-        let reason = match before.map(|plan| plan.stage) {
-            Some(earlier) if !request.force => Some(Reason::After { stage: earlier }),
+        let (reason, is_shared) = match before.map(|plan| plan.stage) {
+            Some(earlier) if !request.force => (Some(Reason::After { stage: earlier }), false),
             _ => {
                 let made_from = run.made_from(&folder, &settings, stage)?;
-                run.standing(&folder, stage, &made_from)?.err()
+                let reason = run.standing(&folder, stage, &made_from)?.err();
+                let is_shared = || run.cache_to_read().is_some_and(|cache| cache.has(stage, &made_from));
+                (reason.clone(), reason.is_some() && is_shared())
             }
         };
-        planned.push(Plan { stage, reason });
+        planned.push(Plan { stage, reason, is_shared });
     }
     Ok(planned)
 }
@@ -186,6 +199,10 @@ struct Run<'a> {
     /// Stages that were kept, as long as inputs and settings do not yet say so.
     kept: Vec<Stage>,
     costs: Vec<StageCost>,
+    /// Whether something has come to the store that runs share.
+    has_stored: bool,
+    /// Whether it was said that nothing comes there.
+    is_store_lost: bool,
 }
 
 impl Run<'_> {
@@ -205,7 +222,10 @@ impl Run<'_> {
             let made_from = self.made_from(folder, &settings, stage)?;
             match self.standing(folder, stage, &made_from)? {
                 Ok(record) => self.keep(folder, stage, record)?,
-                Err(_) => self.make(folder, &mut settings, stage, made_from)?,
+                Err(_) => match self.shared(stage, &made_from) {
+                    Some(taken) => self.take(folder, &mut settings, (stage, made_from), taken)?,
+                    None => self.make(folder, &mut settings, (stage, made_from))?,
+                },
             }
         }
         stages.last().map_or(Ok(()), |&last| self.clear_away(folder, last))?;
@@ -260,13 +280,45 @@ impl Run<'_> {
         Ok(())
     }
 
+    /// The store that runs share, unless all is to be made again.
+    fn cache_to_read(&self) -> Option<&Cache> {
+        self.request.cache.as_ref().filter(|_| !self.request.force)
+    }
+
+    /// A stage's results from the store that runs share.
+    fn shared(&self, stage: Stage, made_from: &MadeFrom) -> Option<Taken> {
+        self.cache_to_read()?.take(stage, made_from, self.request.max_memory_bytes)
+    }
+
+    /// Puts a stage's results in place that another run has made, and repeats what was said of them.
+    fn take(
+        &mut self,
+        folder: &mut RunFolder,
+        settings: &mut Settings,
+        (stage, made_from): (Stage, MadeFrom),
+        taken: Taken,
+    ) -> Result<(), Error> {
+        let watch = Stopwatch::start();
+        let Taken { files, line } = taken;
+        self.put_in_place(folder, settings, (stage, made_from), (&files, &line))?;
+        let how = How::Shared;
+        self.note_cost(
+            folder,
+            StageCost { stage, how, seconds: watch.seconds(), peak_mb: None, parts: vec![] },
+        )?;
+        for (code, message) in provenance::warnings(folder, stage)? {
+            (self.events)(Event::Warning { stage, code, message });
+        }
+        (self.events)(Event::Taken { stage, line });
+        Ok(())
+    }
+
     /// Does a stage and writes what it made.
     fn make(
         &mut self,
         folder: &mut RunFolder,
         settings: &mut Settings,
-        stage: Stage,
-        made_from: MadeFrom,
+        (stage, made_from): (Stage, MadeFrom),
     ) -> Result<(), Error> {
         let (config, events) = (&self.request.loaded.config, self.events);
         events(Event::Started { stage });
@@ -274,24 +326,59 @@ impl Run<'_> {
         let (source, artifacts) = (&self.source, &mut self.artifacts);
         let mut step = Step { stage, config, source, artifacts, events, folder, parts: Vec::new() };
         folder.take_reads();
-        let outcome = steps::perform(&mut step)?;
+        let steps::Outcome { mut files, report, line } = steps::perform(&mut step)?;
         let parts = step.parts;
         debug_assert_eq!(undeclared(stage, folder.take_reads()), [""; 0], "read by {stage}");
-        self.clear_away(folder, stage)?;
-        self.settle_kept(folder, settings)?;
-        write_outcome(folder, (stage, made_from), &outcome)?;
-        self.write_provenance(folder, settings, stage)?;
-        let digest = folder.seal()?;
-        let seconds = watch.seconds();
-        self.costs.push(StageCost { stage, seconds, peak_mb: provenance::peak_memory_mb(), parts });
-        let files = (self.input.as_deref(), &self.artifacts.side_paths);
-        provenance::write_run(folder, config, files, &self.costs, &digest)?;
-        for warning in outcome.report.warnings {
+        let report_file = format!("{}/report.json", stage.folder());
+        files.push((report_file, provenance::report_json(stage, &report).into_bytes()));
+        let record = self.put_in_place(folder, settings, (stage, made_from), (&files, &line))?;
+        let (seconds, peak_mb) = (watch.seconds(), provenance::peak_memory_mb());
+        self.note_cost(folder, StageCost { stage, how: How::Made, seconds, peak_mb, parts })?;
+        self.share(stage, &record, &files);
+        for warning in report.warnings {
             let code = warning.code.to_owned();
             events(Event::Warning { stage, code, message: warning.message });
         }
-        events(Event::Finished { stage, seconds, line: outcome.line });
+        events(Event::Finished { stage, seconds, line });
         Ok(())
+    }
+
+    /// Writes a stage's files with all that speaks of them.
+    fn put_in_place(
+        &mut self,
+        folder: &mut RunFolder,
+        settings: &mut Settings,
+        (stage, made_from): (Stage, MadeFrom),
+        (files, line): (&[(String, Vec<u8>)], &str),
+    ) -> Result<Record, Error> {
+        self.clear_away(folder, stage)?;
+        self.settle_kept(folder, settings)?;
+        let record = write_files(folder, (stage, made_from), files, line)?;
+        self.write_provenance(folder, settings, stage)?;
+        folder.seal()?;
+        Ok(record)
+    }
+
+    /// Notes what a stage has cost, beside the results.
+    fn note_cost(&mut self, folder: &RunFolder, cost: StageCost) -> Result<(), Error> {
+        self.costs.push(cost);
+        let files = (self.input.as_deref(), &self.artifacts.side_paths);
+        provenance::write_run(folder, &self.request.loaded.config, files, &self.costs)
+    }
+
+    /// Stores what a stage has made for other runs. This one has its results: a store that cannot be written to is said,
+    /// once, and no reason to stop.
+    fn share(&mut self, stage: Stage, record: &Record, files: &[(String, Vec<u8>)]) {
+        let Some(cache) = &self.request.cache else { return };
+        match cache.keep(stage, record, files) {
+            Ok(()) => self.has_stored = true,
+            Err(error) if !self.is_store_lost => {
+                self.is_store_lost = true;
+                let message = format!("results are not shared: {error}");
+                (self.events)(Event::Warning { stage, code: "W-RUN-CACHE".to_owned(), message });
+            }
+            Err(_) => {}
+        }
     }
 
     /// Inputs and settings of the stages that were kept.
@@ -436,26 +523,25 @@ fn input_files(
 }
 
 /// Writes a stage's files, its record last. What was made from another version of them goes first.
-fn write_outcome(
+fn write_files(
     folder: &mut RunFolder,
     (stage, made_from): (Stage, MadeFrom),
-    outcome: &steps::Outcome,
-) -> Result<(), Error> {
-    let report_json = provenance::report_json(stage, &outcome.report);
-    let report = (format!("{}/report.json", stage.folder()), report_json.into_bytes());
-    let files: Vec<&(String, Vec<u8>)> = outcome.files.iter().chain([&report]).collect();
+    files: &[(String, Vec<u8>)],
+    line: &str,
+) -> Result<Record, Error> {
     let is_written = |file: &String| files.iter().any(|(written, _)| written == file);
     let gone = stage.writes().into_iter().filter(|file| !is_written(file) && folder.digest(file).is_some());
     let new = files.iter().filter(|(file, bytes)| !folder.vouches_for(file, bytes));
     let changed: BTreeSet<String> = gone.chain(new.map(|(file, _)| file.clone())).collect();
     folder.discard(&outdated(stage, changed))?;
-    for (file, bytes) in &files {
+    for (file, bytes) in files {
         folder.write(file, bytes)?;
     }
-    let digest = |(file, _): &&(String, Vec<u8>)| Some((file.clone(), folder.digest(file)?.clone()));
+    let digest = |(file, _): &(String, Vec<u8>)| Some((file.clone(), folder.digest(file)?.clone()));
     let digests = files.iter().filter_map(digest).collect();
-    let record = Record::new(stage, made_from, digests, outcome.line.clone());
-    folder.write(&Record::file_of(stage), record.to_json().as_bytes())
+    let record = Record::new(stage, made_from, digests, line.to_owned());
+    folder.write(&Record::file_of(stage), record.to_json().as_bytes())?;
+    Ok(record)
 }
 
 /// The files that do not hold any more once some files of a stage change: those of the stage itself, and those of later
@@ -476,6 +562,14 @@ fn outdated(stage: Stage, mut changed: BTreeSet<String>) -> Vec<String> {
 fn undeclared(stage: Stage, reads: BTreeSet<String>) -> Vec<String> {
     let known: Vec<String> = stage.files_read().collect();
     reads.into_iter().filter(|file| !known.contains(file)).collect()
+}
+
+/// Every file that a run may write, relative to its folder.
+fn every_file() -> Vec<String> {
+    let of_stages = Stage::ALL.into_iter().flat_map(Stage::writes);
+    let beside =
+        provenance::FILES.into_iter().chain(provenance::FILES_ASIDE).chain([failure::FILE, DIGEST_FILE]);
+    of_stages.chain(beside.map(str::to_owned)).collect()
 }
 
 /// Whether a file of a run folder is one that `SHA256SUMS` may name.

@@ -25,6 +25,7 @@
 //! | tunnels counted, and closed where they are faults | `euler`, `heal` |
 //! | **[`segment`]**: `Volume` → [`Mask`](espalier_model::Mask) | `segment` |
 //! | **[`read_mask`]**: file → `Mask`, without holding the volume where values alone decide | `read_mask`, `stream` |
+//! | **[`survey()`]**: what a file is | `survey` |
 //! | **[`open_pieces`]**: file → values, without holding the volume | `pieces` |
 //!
 //! **Spaces** World is RAS+ mm. A voxel is (x, y, z), x fastest: of a volume on the file's own axes, of a mask on those
@@ -77,6 +78,8 @@ mod pieces;
 mod read_mask;
 mod stream;
 
+mod survey;
+
 mod error;
 mod options;
 mod params;
@@ -98,4 +101,5 @@ pub use read_error::ReadError;
 pub use read_mask::read_mask;
 pub use segment::{Segmented, clean, in_order, segment};
 pub use spacing::Spacing;
+pub use survey::{MaskSurvey, Survey, survey};
 pub use trachea::{SEED_COLUMNS, SeedCandidate, seeds_to_tsv};

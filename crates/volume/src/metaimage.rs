@@ -16,6 +16,7 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use crate::ascii::AsciiStream;
 use crate::gzip;
+use crate::recognise::Format;
 use crate::scalar::Scalar;
 use crate::source::{Packing, Source};
 use crate::stored::{self, FileStream, Stored, VoxelStream};
@@ -49,7 +50,18 @@ pub(crate) fn open(
     let stream = layout.stream(data, index)?;
     let form = "TransformMatrix and ElementSpacing";
     let is_big_endian = layout.is_binary && is_big_endian(&keys)?;
-    Ok(Stored { shape, world_from_voxel, form, scalar, is_big_endian, slope, intercept, files, stream })
+    Ok(Stored {
+        format: Format::MetaImage,
+        shape,
+        world_from_voxel,
+        form,
+        scalar,
+        is_big_endian,
+        slope,
+        intercept,
+        files,
+        stream,
+    })
 }
 
 /// The header's values by key.

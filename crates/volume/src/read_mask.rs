@@ -90,13 +90,13 @@ impl File<'_> {
                 Ok(None)
             }
             Wish::Values { is_wanted, what } => {
-                self.named(check_limit(bits_bytes(stored), self.options))?;
+                self.named(check_limit(stored.bits_bytes(), self.options))?;
                 let bits = self.named(stream::choose(stored, is_wanted, report))?;
                 let is_of_scan = params.method == Method::Threshold;
                 Ok(Some(Selection { is_of_scan, ..Selection::of(bits, what) }))
             }
             Wish::Kind => {
-                self.named(check_limit(bits_bytes(stored), self.options))?;
+                self.named(check_limit(stored.bits_bytes(), self.options))?;
                 let bits = self.mask_bits(stored, params, report)?;
                 Ok(bits.map(|bits| Selection::of(bits, MASK)))
             }
@@ -128,12 +128,6 @@ impl File<'_> {
         let mut again = self.open(&mut Report::default())?;
         self.named(stream::choose(&mut again, is_in_mask(background), &mut Report::default())).map(Some)
     }
-}
-
-/// The memory of a volume's bits.
-fn bits_bytes(stored: &Stored) -> u64 {
-    let [nx, ny, nz] = stored.shape.map(|extent| extent as u64);
-    nx.div_ceil(64).saturating_mul(8).saturating_mul(ny).saturating_mul(nz)
 }
 
 /// Turns ones to zeros and zeros to ones.

@@ -26,6 +26,17 @@ pub(crate) enum Format {
     MetaImage,
 }
 
+impl Format {
+    /// What its users call it.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Nifti | Self::NiftiImage => "NIfTI",
+            Self::Nrrd => "NRRD",
+            Self::MetaImage => "MetaImage",
+        }
+    }
+}
+
 /// The first key of a MetaImage header, whichever it is.
 const META_KEYS: [&str; 9] = [
     "ObjectType",

@@ -27,6 +27,8 @@ const PIECE_BYTES: usize = 1 << 16;
 
 /// A volume whose header is read and whose voxels are still in the file.
 pub(crate) struct Stored {
+    /// The format of its header.
+    pub(crate) format: Format,
     /// Voxels along x, y, z; each at least 1, their product fits an `isize`.
     pub(crate) shape: [usize; 3],
     /// Maps voxel coordinates to RAS+ mm: finite, but the axes may be sheared or singular.
@@ -142,6 +144,12 @@ impl Stored {
 
     pub(crate) fn n_voxels(&self) -> u64 {
         self.shape.iter().map(|&extent| extent as u64).product()
+    }
+
+    /// The bytes that one bit a voxel takes.
+    pub(crate) fn bits_bytes(&self) -> u64 {
+        let [nx, ny, nz] = self.shape.map(|extent| extent as u64);
+        nx.div_ceil(64).saturating_mul(8).saturating_mul(ny).saturating_mul(nz)
     }
 
     /// The bytes that the voxels take in memory.

@@ -16,6 +16,7 @@ use std::sync::Arc;
 use espalier_model::{ComparedRun, ComparedRuns, Comparison, Tree, ViewHierarchy};
 
 use crate::artifacts::{Artifacts, Lookup};
+use crate::cache::Cache;
 use crate::config::{Config, Loaded, Override};
 use crate::dictionary;
 use crate::error::Error;
@@ -41,6 +42,8 @@ pub struct CompareRequest {
     pub max_memory_bytes: u64,
     /// As in [`Request`].
     pub data_dir: Option<PathBuf>,
+    /// As in [`Request`].
+    pub cache: Option<Cache>,
 }
 
 /// Something to compare.
@@ -59,6 +62,7 @@ pub(crate) struct Place {
     pub(crate) threads: Option<usize>,
     pub(crate) max_memory_bytes: u64,
     pub(crate) data_dir: Option<PathBuf>,
+    pub(crate) cache: Option<Cache>,
 }
 
 impl Subject {
@@ -68,7 +72,7 @@ impl Subject {
             Self::Run(folder) => return Ok(folder.clone()),
             Self::Config(loaded) => loaded.as_ref().clone(),
         };
-        let Place { out, to, threads, max_memory_bytes, data_dir } = place;
+        let Place { out, to, threads, max_memory_bytes, data_dir, cache } = place;
         let run = Request {
             loaded,
             out,
@@ -80,6 +84,7 @@ impl Subject {
             threads,
             max_memory_bytes,
             data_dir,
+            cache,
         };
         run::run(&run, events).map(|summary| summary.out)
     }
@@ -123,6 +128,7 @@ pub fn compare(request: &CompareRequest, events: &(dyn Fn(Event) + Sync)) -> Res
             threads: request.threads,
             max_memory_bytes: request.max_memory_bytes,
             data_dir: request.data_dir.clone(),
+            cache: request.cache.clone(),
         };
         folders.push(subject.folder(place, events)?);
     }

@@ -21,6 +21,7 @@ use espalier_model::MethodRow;
 use espalier_model::diagnose::{Class, Diagnose};
 
 use crate::artifacts::{Artifacts, Lookup};
+use crate::cache::Cache;
 use crate::compare::{self, Files};
 use crate::config::{Loaded, Override, Source};
 use crate::error::{Error, NotSwept};
@@ -50,6 +51,8 @@ pub struct SweepRequest {
     pub max_memory_bytes: u64,
     /// As in [`Request`].
     pub data_dir: Option<PathBuf>,
+    /// As in [`Request`].
+    pub cache: Option<Cache>,
 }
 
 /// A key and its values.
@@ -253,5 +256,6 @@ fn request_of(
         threads: request.threads,
         max_memory_bytes: request.max_memory_bytes,
         data_dir: request.data_dir.clone(),
+        cache: request.cache.clone(),
     }
 }

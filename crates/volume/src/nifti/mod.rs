@@ -17,6 +17,7 @@ use fields::Fields;
 use header::Header;
 pub(crate) use pair::header_of;
 
+use crate::recognise::Format;
 use crate::source::Source;
 use crate::stored::{self, Stored, VoxelStream};
 use crate::{ReadError, ReadOptions};
@@ -45,6 +46,7 @@ pub(crate) fn open(
     source.skip(index * header.volume_bytes)?;
     let n_after = (header.n_volumes - 1 - index) * header.volume_bytes;
     Ok(Stored {
+        format: Format::Nifti,
         shape: header.shape,
         world_from_voxel,
         form,

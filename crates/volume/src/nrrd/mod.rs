@@ -16,6 +16,7 @@ use header::{Encoding, Header};
 
 use crate::ascii::AsciiStream;
 use crate::read::check_limit;
+use crate::recognise::Format;
 use crate::source::Source;
 use crate::stored::{self, FileStream, Interleaved, Stored, VoxelStream};
 use crate::text::Lines;
@@ -35,6 +36,7 @@ pub(crate) fn open(
     let data = open_data(path, &header, &axes, options)?;
     let (world_from_voxel, form) = axes::world_from_voxel(&header, &axes, options, report)?;
     Ok(Stored {
+        format: Format::Nrrd,
         shape: axes.shape,
         world_from_voxel,
         form,
