@@ -23,6 +23,7 @@ Examples:
   espalier embed out/airway --set embed.pso.freedom=s   one stage of a run folder
   espalier skeleton mask.nii.gz -o out/skeleton         one stage on files
   espalier compare out/airway                           its methods side by side: table and figure
+  espalier doctor scan.nii.gz                           what is this file, and what would a run of it cost?
   espalier verify out/airway                            does everything hold that the folder says?
   espalier locate out/airway -32.7,-168.8,-161.8        where is this point of the scan on the map?
   espalier sweep my.toml --over embed.w_length=0.5,1,2  losses against a setting: table and plot
@@ -85,7 +86,7 @@ pub(crate) struct Common {
     /// Threads to use [default: one per core]; no result depends on it
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
-    /// The most memory that reading a file may take, such as 4G [default: half of the machine's]
+    /// The most memory that a stage may take, such as 4G [default: half of the machine's]
     #[arg(long, global = true, value_name = "SIZE", value_parser = parse_size)]
     pub(crate) max_memory: Option<u64>,
     /// Share results between runs that agree: what another run has made from the same files and settings is copied from
@@ -167,6 +168,8 @@ pub(crate) enum Command {
     Locate(LocateArguments),
     /// What an error or warning code means and what to do:  espalier explain E-VOLUME-NO-SPACE
     Explain(ExplainArguments),
+    /// What an input is, what is to be said of it, which command suits it, and what that would cost:  espalier doctor FILE
+    Doctor(DoctorArguments),
     /// Print a script that completes commands and options in a shell:  espalier completions bash
     Completions {
         /// The shell
@@ -362,6 +365,29 @@ pub(crate) struct VerifyArguments {
     #[arg(value_name = "RUN")]
     pub(crate) folder: PathBuf,
     /// Print the checks as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+const DOCTOR_HELP: &str = "\
+Tells of a volume its format, shape, spacing, orientation, type and range, and whether it is a mask, a label map or a scan; of a
+mask its volume, components and loops; of a folder of DICOM slices its series; of a traced tree its nodes, roots, branch points
+and missing radii. Then warnings with their way out, a command to begin with, and seconds and memory of each stage of a run.
+Nothing is written. Exit code 0 if every input can be read, else that of the first which cannot.
+
+Examples:
+  espalier doctor scan.nii.gz                           what is it?
+  espalier doctor dicom/ --series 2 --preset airway
+  espalier doctor masks/*.nii.gz --json --max-memory 4G would all of them fit?";
+
+/// `espalier doctor`.
+#[derive(Debug, Args)]
+#[command(after_help = DOCTOR_HELP)]
+pub(crate) struct DoctorArguments {
+    /// Inputs, or configs (.toml)
+    #[arg(required = true, value_name = "INPUT")]
+    pub(crate) inputs: Vec<PathBuf>,
+    /// Print what was found as JSON: a list with an entry for each input
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -11,15 +11,15 @@ use clap::CommandFactory;
 use espalier_model::Diagnose;
 use espalier_model::diagnose::Class;
 use espalier_pipeline::{
-    Align, Artifact, Cache, ChangeOf, CompareRequest, Config, Error, GroupRequest, JuxtaposeParams,
-    JuxtaposeRequest, Loaded, Override, Plan, PlotRequest, Plotted, Reason, Request, SideFile, Space, Stage,
-    Subject, Summary, SweepRequest, WayTo,
+    Align, Artifact, Cache, ChangeOf, CompareRequest, Config, DoctorRequest, Error, GroupRequest,
+    JuxtaposeParams, JuxtaposeRequest, Loaded, Override, Plan, PlotRequest, Plotted, Reason, Request,
+    SideFile, Space, Stage, Subject, Summary, SweepRequest, WayTo,
 };
 
 use crate::args::{
-    Arguments, Command, CompareArguments, GroupArguments, JuxtaposeArguments, LocateArguments,
-    PhantomArguments, PlaceArguments, ProfileArguments, Rerun, RunArguments, StageArguments, SweepArguments,
-    VerifyArguments,
+    Arguments, Command, CompareArguments, DoctorArguments, GroupArguments, JuxtaposeArguments,
+    LocateArguments, PhantomArguments, PlaceArguments, ProfileArguments, Rerun, RunArguments, StageArguments,
+    SweepArguments, VerifyArguments,
 };
 use crate::checks;
 use crate::explain;
@@ -48,6 +48,7 @@ pub(crate) fn execute(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Report(stage) => run_stage(arguments, stage, Stage::Report)?,
         Command::Verify(verify) => return verify_folder(arguments, verify),
         Command::Profile(profile) => return print_profile(arguments, profile),
+        Command::Doctor(doctor) => return examine(arguments, doctor),
         Command::Locate(locate) => return print_located(arguments, locate),
         Command::Explain(explain) => return explain::print(explain),
         Command::Completions { shell } => {
@@ -196,7 +197,9 @@ fn pipeline_request(arguments: &Arguments, run: &RunArguments) -> anyhow::Result
 
 /// Prints which stages a run would do, and why.
 fn print_plan(arguments: &Arguments, run: &RunArguments) -> anyhow::Result<()> {
-    for Plan { stage, reason, is_shared } in espalier_pipeline::plan(&pipeline_request(arguments, run)?)? {
+    let plans = espalier_pipeline::plan(&pipeline_request(arguments, run)?)?;
+    let costs: Vec<_> = plans.iter().filter_map(|plan| Some((plan.stage, plan.cost?))).collect();
+    for Plan { stage, reason, is_shared, .. } in plans {
         let text = match reason {
             None => "kept".to_owned(),
             Some(reason @ Reason::After { .. }) => format!("to do if that changes: {reason}"),
@@ -205,7 +208,54 @@ fn print_plan(arguments: &Arguments, run: &RunArguments) -> anyhow::Result<()> {
         };
         progress::result(&format!("{stage:<9} {text}"));
     }
+    if !costs.is_empty() {
+        progress::result("");
+        progress::result(espalier_pipeline::costs_table(&costs).trim_end());
+    }
     Ok(())
+}
+
+/// Prints what inputs are. One that cannot be read does not keep the others from being looked at.
+fn examine(arguments: &Arguments, doctor: &DoctorArguments) -> anyhow::Result<()> {
+    let (mut first_error, mut entries) = (None, Vec::new());
+    let threads = arguments.common.threads.map_or_else(cores, usize::from);
+    for input in &doctor.inputs {
+        let request = DoctorRequest {
+            config_or_input: input.clone(),
+            overrides: arguments.common.overrides.clone(),
+            threads: arguments.common.threads.map(usize::from),
+            max_memory_bytes: arguments.common.max_memory.unwrap_or_else(half_of_memory),
+            data_dir: data_dir(),
+        };
+        let name = input.display().to_string();
+        match espalier_pipeline::doctor(&request) {
+            Ok(examined) if doctor.json => {
+                entries.push(serde_json::json!({ "input": name, "found": examined.to_json(threads) }));
+            }
+            Ok(examined) => progress::result(examined.to_text(threads).trim_end()),
+            Err(error) => {
+                let (code, message, hint) = (error.code(), error.to_string(), error.hint());
+                let told = serde_json::json!({ "code": code, "message": message, "hint": hint });
+                entries.push(serde_json::json!({ "input": name, "error": told }));
+                // The last word on the first one is that of every command.
+                let error = anyhow::Error::from(error);
+                if first_error.is_some() {
+                    report_failure(&error);
+                }
+                first_error.get_or_insert(error);
+            }
+        }
+    }
+    if doctor.json {
+        let whole = serde_json::json!({ "format": "espalier-doctor", "version": 1, "inputs": entries });
+        progress::result(&serde_json::to_string_pretty(&whole).unwrap_or_default());
+    }
+    first_error.map_or(Ok(()), Err)
+}
+
+/// How many threads a run has if nobody says.
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
 fn run_compare(arguments: &Arguments, compare: &CompareArguments) -> anyhow::Result<Summary> {

@@ -51,7 +51,8 @@ impl Progress {
             | Event::Progress { .. }
             | Event::Finished { .. }
             | Event::Kept { .. }
-            | Event::Taken { .. },
+            | Event::Taken { .. }
+            | Event::Ended { .. },
         ) = (self.is_quiet, &event)
         {
             return;
@@ -93,6 +94,13 @@ impl Progress {
             Event::Taken { stage, line: text } => {
                 finish(&mut bar);
                 line(&format!("{stage:<9}  shared  {text}"));
+            }
+            Event::Ended { seconds, peak_mb, n_warnings } => {
+                finish(&mut bar);
+                let memory = peak_mb.map_or_else(String::new, |mb| format!("  {mb:.0} MB of memory at most"));
+                let warnings =
+                    if n_warnings == 1 { "1 warning".to_owned() } else { format!("{n_warnings} warnings") };
+                line(&format!("{:<9}{seconds:>6.1} s{memory}, {warnings}", "in all"));
             }
             Event::Combination { done, total, line: text } => {
                 finish(&mut bar);

@@ -191,8 +191,7 @@ impl Artifacts {
             return Ok(Arc::clone(mask));
         }
         let path = self.locate(Artifact::Mask, lookup)?;
-        let volume = self.read_volume(&path, lookup.stage)?.volume;
-        let mask = Mask::from_voxels(volume.grid().clone(), &volume.map_values(|value| value != 0.0));
+        let mask = self.read_nonzero(&path, lookup.stage)?;
         let mask = espalier_volume::in_order(mask, self.orientation).map_err(|e| Error::file(&path, e))?;
         let mask = Arc::new(mask);
         self.mask = Some(Arc::clone(&mask));
@@ -217,18 +216,10 @@ impl Artifacts {
             return Ok(Arc::clone(skeleton));
         }
         let path = self.locate(Artifact::Skeleton, lookup)?;
-        let volume = self.read_volume(&path, lookup.stage)?.volume;
-        let grid = volume.grid();
-        let mut voxels = Vec::new();
-        let mut index = 0;
-        volume.for_each_value(|value| {
-            if value != 0.0 {
-                // An extent read from a NIfTI-1 file fits 16 bits.
-                voxels.push(grid.voxel(index).map(|coordinate| coordinate as u32));
-            }
-            index += 1;
-        });
-        let mut skeleton = Skeleton::new(grid.clone(), voxels);
+        let marked = self.read_nonzero(&path, lookup.stage)?;
+        // Extents fit 32 bits: a file has none larger.
+        let voxels = marked.voxels().map(|voxel| voxel.map(|coordinate| coordinate as u32)).collect();
+        let mut skeleton = Skeleton::new(marked.grid().clone(), voxels);
         if self.orientation == Orientation::Ras {
             skeleton = skeleton.in_ras_order().map_err(|error| Error::file(&path, error))?;
         }
@@ -357,9 +348,10 @@ impl Artifacts {
         fs::read(path).map_err(read)
     }
 
-    fn read_volume(&self, path: &Path, stage: Stage) -> Result<espalier_volume::Loaded, Error> {
+    fn read_nonzero(&self, path: &Path, stage: Stage) -> Result<Mask, Error> {
         // The reader's own message names the file.
-        espalier_volume::read(path, &self.read_options).map_err(|error| Error::stage(stage)(Box::new(error)))
+        espalier_volume::read_nonzero(path, &self.read_options)
+            .map_err(|error| Error::stage(stage)(Box::new(error)))
     }
 
     /// The file of an artifact: the one that the user named, else that of the run folder, checked.

@@ -238,6 +238,16 @@ pub enum Error {
         /// The most that reading a file may take, in bytes.
         limit: u64,
     },
+    /// A stage would take more memory than allowed.
+    #[error("{stage} would take about {needed} bytes of memory, allowed are {limit}")]
+    Memory {
+        /// The stage.
+        stage: Stage,
+        /// What it would take, in bytes.
+        needed: u64,
+        /// What it may take, in bytes.
+        limit: u64,
+    },
     /// An output cannot be created.
     #[error("cannot create {path}: {source}", path = path.display())]
     Create {
@@ -342,7 +352,7 @@ impl Diagnose for Error {
             Self::OtherSettings { .. } => "E-RUN-SETTINGS",
             Self::OtherInput { .. } => "E-RUN-INPUT",
             Self::Read { .. } => "E-IO-READ",
-            Self::TooLarge { .. } => "E-LIMIT-MEMORY",
+            Self::TooLarge { .. } | Self::Memory { .. } => "E-LIMIT-MEMORY",
             Self::Create { .. } => "E-IO-CREATE",
             Self::Write { .. } => "E-IO-WRITE",
             Self::Locked { .. } => "E-RUN-LOCKED",
@@ -380,7 +390,7 @@ impl Diagnose for Error {
             | Self::Read { .. }
             | Self::Write { .. } => Class::Io,
             Self::Altered { .. } | Self::Certificate { .. } | Self::Unverified { .. } => Class::Uncertified,
-            Self::TooLarge { .. } => Class::Limit,
+            Self::TooLarge { .. } | Self::Memory { .. } => Class::Limit,
             Self::Create { .. } => Class::CannotCreate,
             Self::Locked { .. } => Class::Locked,
         }
@@ -432,6 +442,15 @@ impl Diagnose for Error {
             Self::OtherInput { first, .. } => format!("run with --from {first}, or choose another folder with -o"),
             Self::Input { .. } => "set it to the folder of the data".to_owned(),
             Self::TooLarge { .. } => "allow more with --max-memory".to_owned(),
+            Self::Memory { stage: Stage::Render, .. } => {
+                "allow more with --max-memory, or take less with render.width_px, or render.space = false".to_owned()
+            }
+            Self::Memory { stage: Stage::Embed | Stage::Views, .. } => {
+                "allow more with --max-memory, or take fewer nodes with tree.resample".to_owned()
+            }
+            Self::Memory { .. } => {
+                "allow more with --max-memory, or take coarser voxels with volume.resample_mm".to_owned()
+            }
             Self::Create { .. } => "choose another folder with -o".to_owned(),
             Self::Write { .. } => "check the free space and the permissions of the folder".to_owned(),
             Self::Locked { .. } => "wait for it with --wait, or choose another folder with -o".to_owned(),

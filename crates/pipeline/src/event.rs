@@ -61,6 +61,15 @@ pub enum Event {
         /// What it did when they were made, as a phrase.
         line: String,
     },
+    /// The run is at its end.
+    Ended {
+        /// How long it took.
+        seconds: f64,
+        /// The most memory that the program has held, in MB, where the system tells it.
+        peak_mb: Option<f64>,
+        /// Warnings of all stages.
+        n_warnings: usize,
+    },
     /// A combination of a sweep is done.
     Combination {
         /// Which, from 1.

@@ -14,6 +14,8 @@
 //! | the run folder: atomic files, digests; one run at a time | `folder`, `lock` |
 //! | what a stage's results were made from, and whether they still stand | `record` |
 //! | results that runs share | `cache` |
+//! | what a stage costs, before it is done | [`estimate`] |
+//! | what an input is, and what suits it | [`doctor()`] |
 //! | how a result came about, what each method cost, why a run stopped | `provenance`, `methods`, `failure` |
 //! | the page of a run: what it is made from | `page` |
 //! | what the columns of the tables mean | `dictionary` |
@@ -33,7 +35,9 @@ mod clock;
 pub mod compare;
 pub mod config;
 mod dictionary;
+mod doctor;
 mod error;
+pub mod estimate;
 mod event;
 pub mod explain;
 mod failure;
@@ -63,6 +67,7 @@ mod verify;
 pub use cache::Cache;
 pub use compare::{CompareRequest, Compared, Subject, compare};
 pub use config::{Config, ConfigError, Loaded, Override};
+pub use doctor::{Advice, DoctorRequest, Examined, Fact, costs_table, doctor};
 pub use error::{Error, NotSwept};
 pub use espalier_juxtapose::{Align, Params as JuxtaposeParams};
 pub use espalier_render::ChangeOf;

@@ -30,6 +30,8 @@ pub(crate) struct StageCost {
     pub(crate) stage: Stage,
     pub(crate) how: How,
     pub(crate) seconds: f64,
+    /// Seconds of all cores together, of this program.
+    pub(crate) cpu_seconds: Option<f64>,
     pub(crate) peak_mb: Option<f64>,
     /// The same of its parts, where it has any.
     pub(crate) parts: Vec<PartCost>,
@@ -193,9 +195,28 @@ struct RunRecord<'a> {
     stages: Vec<&'static str>,
     /// Those of them whose results were taken from the store that runs share.
     shared: Vec<&'static str>,
+    /// What each of them has cost here and now.
+    costs: Vec<CostRecord>,
     threads: usize,
     finished_unix_seconds: u64,
     sha256_of_sums: String,
+}
+
+/// What a stage has cost in a run.
+#[derive(Serialize)]
+struct CostRecord {
+    stage: &'static str,
+    seconds: f64,
+    cpu_seconds: Option<f64>,
+    /// The most memory that the program has held until its end.
+    peak_mb: Option<f64>,
+}
+
+impl CostRecord {
+    fn of(cost: &StageCost) -> Self {
+        let StageCost { stage, seconds, cpu_seconds, peak_mb, .. } = *cost;
+        Self { stage: stage.name(), seconds, cpu_seconds, peak_mb }
+    }
 }
 
 /// Writes what depends on this machine and this hour: `provenance/run.json` and `provenance/timings.tsv`.
@@ -222,6 +243,7 @@ pub(crate) fn write_run(
             .collect(),
         stages: names(|_| true),
         shared: names(|cost| cost.how == How::Shared),
+        costs: costs.iter().map(CostRecord::of).collect(),
         threads: rayon::current_num_threads(),
         finished_unix_seconds: clock::unix_seconds(),
         sha256_of_sums: folder.digest_of(|_| true),
@@ -268,6 +290,28 @@ pub(crate) fn peak_memory_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     line.split_whitespace().next()?.parse::<f64>().ok().map(|kb| kb / 1024.0)
+}
+
+/// Seconds that this process has worked so far on all cores together, where the system tells it.
+pub(crate) fn cpu_seconds() -> Option<f64> {
+    /// What Linux counts in, whatever its own clock ticks.
+    const TICKS_PER_SECOND: f64 = 100.0;
+    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
+    // The program's name is in parentheses and may hold blanks; user and system time are the 14th and 15th field.
+    let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
+    let ticks = |field: usize| fields.get(field - 3)?.parse::<f64>().ok();
+    Some((ticks(14)? + ticks(15)?) / TICKS_PER_SECOND)
+}
+
+/// The counts in the report of a stage; none if there is none.
+pub(crate) fn counts(folder: &RunFolder, stage: Stage) -> BTreeMap<String, f64> {
+    #[derive(Deserialize)]
+    struct Counted {
+        counts: BTreeMap<String, f64>,
+    }
+    let text = folder.text_if_there(&format!("{}/report.json", stage.folder())).ok().flatten();
+    let counted = text.and_then(|text| serde_json::from_str::<Counted>(&text).ok());
+    counted.map(|counted| counted.counts).unwrap_or_default()
 }
 
 #[derive(Serialize)]

@@ -9,7 +9,9 @@ use crate::artifacts::Artifacts;
 use crate::cache::{Cache, Taken};
 use crate::clock::Stopwatch;
 use crate::config::{Config, Loaded, Source, Unit};
+use crate::doctor;
 use crate::error::Error;
+use crate::estimate::{Cost, Sizes};
 use crate::event::Event;
 use crate::failure;
 use crate::folder::{DIGEST_FILE, RunFolder, hex_digest};
@@ -41,7 +43,7 @@ pub struct Request {
     pub wait: bool,
     /// Threads; `None` for one per core. No result depends on it.
     pub threads: Option<usize>,
-    /// The most memory that reading a file may take, in bytes.
+    /// The most memory that a stage may take, in bytes.
     pub max_memory_bytes: u64,
     /// What `$ESPALIER_DATA` stands for.
     pub data_dir: Option<PathBuf>,
@@ -83,6 +85,7 @@ pub(crate) fn in_pool<T: Send>(
 }
 
 fn run_stages(request: &Request, events: &(dyn Fn(Event) + Sync)) -> Result<Summary, Error> {
+    let watch = Stopwatch::start();
     let (mut run, stages) = prepare(request, events)?;
     let say_so = || events(Event::Waiting { out: request.out.clone() });
     let patience = if request.wait { Patience::Wait(&say_so) } else { Patience::None };
@@ -104,6 +107,8 @@ fn run_stages(request: &Request, events: &(dyn Fn(Event) + Sync)) -> Result<Summ
         events(Event::Stopped { kept, out: request.out.clone() });
     }
     let digest = done?;
+    let seconds = watch.seconds();
+    events(Event::Ended { seconds, peak_mb: provenance::peak_memory_mb(), n_warnings: run.n_warnings });
     let highlights = stages.last().map(|last| last.writes()).unwrap_or_default();
     let is_highlight = |file: &String| !file.ends_with("/record.json") && folder.path().join(file).exists();
     let highlights = highlights.into_iter().filter(is_highlight).collect();
@@ -142,12 +147,13 @@ fn prepare<'a>(
         costs: Vec::new(),
         has_stored: false,
         is_store_lost: false,
+        n_warnings: 0,
     };
     Ok((run, stages))
 }
 
 /// What a run would do with a stage.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// The stage.
     pub stage: Stage,
@@ -155,6 +161,8 @@ pub struct Plan {
     pub reason: Option<Reason>,
     /// Whether its results would be taken from the store that runs share.
     pub is_shared: bool,
+    /// What it would cost, where that can be told.
+    pub cost: Option<Cost>,
 }
 
 /// What a run would do, stage by stage; nothing is written and nothing is locked.
@@ -179,9 +187,25 @@ pub fn plan(request: &Request) -> Result<Vec<Plan>, Error> {
                 (reason.clone(), reason.is_some() && is_shared())
             }
         };
-        planned.push(Plan { stage, reason, is_shared });
+        planned.push(Plan { stage, reason, is_shared, cost: None });
+    }
+    let is_to_do = |plan: &Plan| plan.reason.is_some() && !plan.is_shared;
+    if planned.iter().any(is_to_do) {
+        let costs = costs_of(request, &run.source, &folder, &planned);
+        for plan in planned.iter_mut().filter(|plan| is_to_do(plan)) {
+            plan.cost = costs.iter().find(|(stage, _)| *stage == plan.stage).map(|(_, cost)| *cost);
+        }
     }
     Ok(planned)
+}
+
+/// What the stages of a run would cost, as far as that can be told: by the reports of the stages that are kept, else from its
+/// input. An input that cannot be read is told by the run itself, if it needs it.
+fn costs_of(request: &Request, source: &Source, folder: &RunFolder, planned: &[Plan]) -> Vec<(Stage, Cost)> {
+    let makes_tree = planned.iter().any(|plan| plan.stage <= Stage::Tree && plan.reason.is_some());
+    let of_input = if makes_tree { doctor::sizes_of(request, source).ok().flatten() } else { None };
+    let sizes = of_input.or_else(|| Sizes::of_reports(folder));
+    sizes.map(|sizes| doctor::costs(request, &stages_of(source), sizes)).unwrap_or_default()
 }
 
 /// A run under way.
@@ -203,6 +227,8 @@ struct Run<'a> {
     has_stored: bool,
     /// Whether it was said that nothing comes there.
     is_store_lost: bool,
+    /// Warnings of all stages, also of those that were kept.
+    n_warnings: usize,
 }
 
 impl Run<'_> {
@@ -273,10 +299,17 @@ impl Run<'_> {
         let own = folder.digest_if_there(&record_file)?.map(|digest| (record_file, digest));
         folder.adopt(record.files().clone().into_iter().chain(own));
         self.kept.push(stage);
+        self.repeat_warnings(folder, stage)?;
+        (self.events)(Event::Kept { stage, line: record.line });
+        Ok(())
+    }
+
+    /// Says again what a stage had to say when its results were made.
+    fn repeat_warnings(&mut self, folder: &RunFolder, stage: Stage) -> Result<(), Error> {
         for (code, message) in provenance::warnings(folder, stage)? {
+            self.n_warnings += 1;
             (self.events)(Event::Warning { stage, code, message });
         }
-        (self.events)(Event::Kept { stage, line: record.line });
         Ok(())
     }
 
@@ -301,14 +334,10 @@ impl Run<'_> {
         let watch = Stopwatch::start();
         let Taken { files, line } = taken;
         self.put_in_place(folder, settings, (stage, made_from), (&files, &line))?;
-        let how = How::Shared;
-        self.note_cost(
-            folder,
-            StageCost { stage, how, seconds: watch.seconds(), peak_mb: None, parts: vec![] },
-        )?;
-        for (code, message) in provenance::warnings(folder, stage)? {
-            (self.events)(Event::Warning { stage, code, message });
-        }
+        let (how, seconds) = (How::Shared, watch.seconds());
+        let cost = StageCost { stage, how, seconds, cpu_seconds: None, peak_mb: None, parts: Vec::new() };
+        self.note_cost(folder, cost)?;
+        self.repeat_warnings(folder, stage)?;
         (self.events)(Event::Taken { stage, line });
         Ok(())
     }
@@ -322,7 +351,7 @@ impl Run<'_> {
     ) -> Result<(), Error> {
         let (config, events) = (&self.request.loaded.config, self.events);
         events(Event::Started { stage });
-        let watch = Stopwatch::start();
+        let (watch, cpu_before) = (Stopwatch::start(), provenance::cpu_seconds());
         let (source, artifacts) = (&self.source, &mut self.artifacts);
         let mut step = Step { stage, config, source, artifacts, events, folder, parts: Vec::new() };
         folder.take_reads();
@@ -333,8 +362,10 @@ impl Run<'_> {
         files.push((report_file, provenance::report_json(stage, &report).into_bytes()));
         let record = self.put_in_place(folder, settings, (stage, made_from), (&files, &line))?;
         let (seconds, peak_mb) = (watch.seconds(), provenance::peak_memory_mb());
-        self.note_cost(folder, StageCost { stage, how: How::Made, seconds, peak_mb, parts })?;
+        let cpu_seconds = provenance::cpu_seconds().zip(cpu_before).map(|(now, before)| now - before);
+        self.note_cost(folder, StageCost { stage, how: How::Made, seconds, cpu_seconds, peak_mb, parts })?;
         self.share(stage, &record, &files);
+        self.n_warnings += report.warnings.len();
         for warning in report.warnings {
             let code = warning.code.to_owned();
             events(Event::Warning { stage, code, message: warning.message });
@@ -617,7 +648,7 @@ fn stages_to_do(request: &Request, source: &Source) -> Result<Vec<Stage>, Error>
     Ok(available.into_iter().filter(|stage| (from..=to).contains(stage)).collect())
 }
 
-fn artifacts_of(request: &Request, source: &Source) -> Artifacts {
+pub(crate) fn artifacts_of(request: &Request, source: &Source) -> Artifacts {
     let Loaded { config, base_dir } = &request.loaded;
     let input = &config.input;
     let mut files = request.files.clone();

@@ -17,6 +17,7 @@ use crate::compare::figure;
 use crate::config::{Config, Source};
 use crate::dictionary;
 use crate::error::Error;
+use crate::estimate::{self, Sizes};
 use crate::event::Event;
 use crate::folder::RunFolder;
 use crate::labels;
@@ -130,6 +131,7 @@ fn volume(step: &mut Step<'_>) -> Result<Outcome, Error> {
 
 fn skeleton(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let mask = step.take(Artifacts::mask)?;
+    step.must_fit(&Sizes::of_mask(&mask))?;
     let made =
         espalier_skeleton::skeletonize(&mask, &step.config.skeleton).map_err(|error| step.failed(error))?;
     let line = format!("{} voxels", made.skeleton.voxels().len());
@@ -141,6 +143,7 @@ fn skeleton(step: &mut Step<'_>) -> Result<Outcome, Error> {
 fn radius(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let mask = step.take(Artifacts::mask)?;
     let skeleton = step.take(Artifacts::skeleton)?;
+    step.must_fit(&Sizes::of_mask(&mask))?;
     let measured = espalier_radius::inscribed_spheres(&mask, &skeleton, &step.config.radius)
         .map_err(|error| step.failed(error))?;
     let spheres = measured.spheres;
@@ -173,9 +176,11 @@ fn tree(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let mut scan = None;
     let (built, mut report) = if step.is_traced() {
         let (traced, report) = step.take(Artifacts::traced)?;
+        step.must_fit(&Sizes { nodes: traced.nodes.len() as u64, ..Sizes::default() })?;
         (espalier_tree::from_traced(&traced, params).map_err(|error| step.failed(error))?, report)
     } else {
         let mask = step.take(Artifacts::mask)?;
+        step.must_fit(&Sizes::of_mask(&mask))?;
         let skeleton = step.take(Artifacts::skeleton)?;
         let spheres = step.take(Artifacts::spheres)?;
         ledger = step.take(Artifacts::dropped)?;
@@ -235,6 +240,7 @@ fn warn_of_unit(tree: &Tree, report: &mut Report) {
 
 fn views(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let tree = step.take(Artifacts::tree)?;
+    step.must_fit(&Sizes::default().and_tree(&tree))?;
     let found = espalier_views::find_views(&tree, &step.config.views, step.config.seed)
         .map_err(|error| step.failed(error))?;
     let json = found.hierarchy.to_json();
@@ -252,6 +258,7 @@ fn views(step: &mut Step<'_>) -> Result<Outcome, Error> {
 
 fn embed(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let tree = step.take(Artifacts::tree)?;
+    step.must_fit(&Sizes::default().and_tree(&tree))?;
     let views = step.take(Artifacts::views)?;
     let mut params = step.config.embed.clone();
     if params.pose == PoseMode::Auto {
@@ -290,6 +297,9 @@ fn render(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let embedding = step.take(Artifacts::embedding)?;
     let comparison = step.take(Artifacts::comparison)?;
     let mut params = step.config.render.clone();
+    let mask = if params.space && page::has_mask(step) { Some(step.take(Artifacts::mask)?) } else { None };
+    let sizes = mask.as_deref().map(Sizes::of_mask).unwrap_or_default();
+    step.must_fit(&sizes.and_tree(&tree).and_pictures(&params))?;
     params.title = params.title.or_else(|| step.config.own_name().map(str::to_owned));
     params.compass = figure::compass(params.compass, step.artifacts.is_of_scan);
     params.labels = labels::labels(step, &tree)?;
@@ -351,6 +361,13 @@ impl<'a> Step<'a> {
     ) -> Result<T, Error> {
         let lookup = Lookup { folder: self.folder, stage: self.stage };
         artifact(self.artifacts, lookup)
+    }
+
+    /// Checks that the stage will not take more memory than allowed, before it takes any.
+    fn must_fit(&self, sizes: &Sizes) -> Result<(), Error> {
+        let (needed, limit) =
+            (estimate::cost(self.stage, sizes).bytes, self.artifacts.read_options.max_bytes);
+        if needed > limit { Err(Error::Memory { stage: self.stage, needed, limit }) } else { Ok(()) }
     }
 
     pub(crate) fn failed(&self, error: impl espalier_model::Diagnose + Send + Sync + 'static) -> Error {

@@ -98,7 +98,7 @@ pub use params::{Components, Method, Orientation, Params, Preset};
 pub use pieces::{Pieces, open_pieces};
 pub use read::{Loaded, files, read};
 pub use read_error::ReadError;
-pub use read_mask::read_mask;
+pub use read_mask::{read_mask, read_nonzero};
 pub use segment::{Segmented, clean, in_order, segment};
 pub use spacing::Spacing;
 pub use survey::{MaskSurvey, Survey, survey};

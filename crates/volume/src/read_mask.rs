@@ -1,4 +1,4 @@
-//! File → [`Mask`](espalier_model::Mask).
+//! File → [`Mask`].
 //!
 //! **Input** a path to a volume file, and [`Params`]. **Output** [`Segmented`], whose report begins with the reader's.
 //! **Steps** 1. where the choice depends on each value alone, the bits of the voxels straight from the file, and what
@@ -10,7 +10,7 @@
 
 use std::path::Path;
 
-use espalier_model::{Bits, Report};
+use espalier_model::{Bits, Mask, Report};
 
 use crate::dicom;
 use crate::read::{check_limit, count_grid, orthogonal_grid};
@@ -47,6 +47,27 @@ pub fn read_mask(path: &Path, options: &ReadOptions, params: &Params) -> Result<
         Ok((census.min, census.max))
     })?;
     Ok(after(report, segmented))
+}
+
+/// Reads which voxels of a file are not 0: a mask as it was handed on, of which nothing is chosen or cleaned.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_nonzero(path: &Path, options: &ReadOptions) -> Result<Mask, Error> {
+    let file = File { path, options };
+    let whole = || {
+        let volume = read(path, options)?.volume;
+        Ok(Mask::from_voxels(volume.grid().clone(), &volume.map_values(|value| value != 0.0)))
+    };
+    if file.named(dicom::is_dicom(path))? {
+        return whole();
+    }
+    let mut report = Report::default();
+    let mut stored = file.open(&mut report)?;
+    let Some(grid) = file.named(orthogonal_grid(&stored, options))? else { return whole() };
+    file.named(check_limit(stored.bits_bytes(), options))?;
+    let bits = file.named(stream::choose(&mut stored, |value| value != 0.0, &mut report))?;
+    Ok(Mask::new(grid, bits))
 }
 
 /// The segmented with the reader's report before its own.

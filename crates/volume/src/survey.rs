@@ -76,10 +76,8 @@ pub fn survey(path: &Path, options: &ReadOptions) -> Result<Survey, Error> {
     let mut stored = Stored::open(path, options, &mut report).map_err(named)?;
     let header = Header { format: stored.format.name(), placed_by: stored.form, n_files: stored.files.len() };
     let Some(grid) = orthogonal_grid(&stored, options).map_err(named)? else {
-        report.warn("W-VOLUME-SHEARED", "the axes are sheared: a run resamples it to orthogonal ones");
-        let whole = survey_whole(path, options, header)?;
-        report.extend(whole.report);
-        return Ok(Survey { report, ..whole });
+        // Sheared: a run has it resampled to orthogonal axes.
+        return survey_whole(path, options, header);
     };
     let (scalar, scaling) = (name_of(stored.scalar), (stored.slope, stored.intercept));
     check_limit(stored.bits_bytes(), options).map_err(named)?;

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::Error;
 
 /// The parts of the program in the order of the data, and what is said of the codes of each.
-const PARTS: [(&str, &str); 9] = [
+const PARTS: [(&str, &str); 10] = [
     ("command line, configs, run folders", include_str!("run.toml")),
     ("volumes, masks, label maps", include_str!("volume.toml")),
     ("DICOM", include_str!("dicom.toml")),
@@ -23,6 +23,7 @@ const PARTS: [(&str, &str); 9] = [
     ("render, report", include_str!("picture.toml")),
     ("compare, juxtapose, sweep, group, profile, locate", include_str!("runs.toml")),
     ("phantom", include_str!("phantom.toml")),
+    ("doctor", include_str!("doctor.toml")),
 ];
 
 /// How many characters may differ between a code as typed and one that it is taken for.

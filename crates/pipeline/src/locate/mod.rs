@@ -164,9 +164,8 @@ fn read_mask(run: &RunFolder, max_bytes: u64) -> Result<Option<Mask>, Error> {
     }
     run.read(file)?;
     let options = espalier_volume::ReadOptions { max_bytes, ..espalier_volume::ReadOptions::default() };
-    let read = espalier_volume::read(&path, &options);
-    let volume = read.map_err(|error| Error::stage(Stage::Volume)(boxed(error)))?.volume;
-    Ok(Some(Mask::from_voxels(volume.grid().clone(), &volume.map_values(|value| value != 0.0))))
+    let read = espalier_volume::read_nonzero(&path, &options);
+    read.map(Some).map_err(|error| Error::stage(Stage::Volume)(boxed(error)))
 }
 
 impl Picture {
