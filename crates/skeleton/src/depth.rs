@@ -45,6 +45,18 @@ impl Depths {
         Self { words, depths: chamfer(lattice) }
     }
 
+    /// The same for the foreground of a smaller lattice alone.
+    pub(crate) fn within(&self, lattice: &Lattice) -> Self {
+        let mut depths = Vec::new();
+        let mut words = Vec::with_capacity(self.words.len());
+        for (&(bits, before), &kept) in self.words.iter().zip(lattice.bits().words()) {
+            words.push((kept, depths.len()));
+            let all = ones(bits).zip(self.depths.get(before..).unwrap_or_default());
+            depths.extend(all.filter(|&(bit, _)| kept >> bit & 1 != 0).map(|(_, &depth)| depth));
+        }
+        Self { words, depths }
+    }
+
     /// The foreground cells of a word of the lattice, as it was.
     pub(crate) fn foreground(&self, word: usize) -> u64 {
         self.words[word].0

@@ -7,9 +7,10 @@
 //! | 3 | `euler`, `simple` | what a voxel's 26 neighbours say: end point, Euler invariance, simplicity |
 //! | 4 | `open` | the voxels that may have become deletable |
 //! | 5 | `thinning` | peel border voxels from six sides until nothing changes (`lee94`) |
-//! | 6 | `depth`, `safe` | the same, level by level of depth in mm, with tips that hold (`safe`) |
-//! | 7 | `tips` | move tips to where they belong (`safe`) |
-//! | 8 | `restore` | bring back the branches that are missing (`safe`) |
+//! | 6 | `rough` | take the bumps of rough walls away (`safe`) |
+//! | 7 | `depth`, `safe` | peel level by level of depth in mm, with tips that hold (`safe`) |
+//! | 8 | `tips` | move tips to where they belong (`safe`) |
+//! | 9 | `restore` | bring back the branches that are missing (`safe`) |
 //!
 //! Connectivity is 26 for the foreground and 6 for the background throughout. Thinning settles ties by storage order, so
 //! masks should come with their axes towards right, anterior, superior, as the stage before hands them on.
@@ -33,6 +34,7 @@ mod euler;
 mod lattice;
 mod open;
 mod restore;
+mod rough;
 mod safe;
 mod simple;
 mod thinning;

@@ -23,8 +23,16 @@ impl Direction {
         [Self::Words(-row), Self::Words(row), Self::Right, Self::Left, Self::Words(slab), Self::Words(-slab)]
     }
 
+    /// The axis that it goes along.
+    pub(crate) fn axis(self, lattice: &Lattice) -> usize {
+        match self {
+            Self::Left | Self::Right => 0,
+            Self::Words(step) => 1 + usize::from(step.unsigned_abs() != lattice.word_strides()[0]),
+        }
+    }
+
     /// The neighbours on this side of the cells of a word.
-    fn neighbors(self, words: &[u64], word: usize) -> u64 {
+    pub(crate) fn neighbors(self, words: &[u64], word: usize) -> u64 {
         match self {
             // Rows begin and end with padding, so nothing is carried from one to the next.
             Self::Left => words[word] << 1 | word.checked_sub(1).map_or(0, |last| words[last] >> (WORD - 1)),

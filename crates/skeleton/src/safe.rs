@@ -3,7 +3,7 @@
 //! **Input** a lattice. **Output** the same lattice with the skeleton left; the number of sweeps.
 //! **Notation** a voxel is *due* at a level if its depth is no larger. A *tooth* is an end voxel whose one neighbour
 //! has more than two. A *corner* is a voxel whose neighbours all lie in one 2×2×2 block with it.
-//! **Steps** For each level, sweep over the voxels that are due until nothing changes; deeper ones are held. A voxel
+//! **Steps** Bumps of a rough wall go ([`crate::rough`]). For each level, sweep over the voxels that are due until nothing changes; deeper ones are held. A voxel
 //! goes if it is simple in the full sense (Euler invariant, one component of neighbours) and
 //! 1. is no end voxel, or is a tooth;
 //! 2. is no corner made by the sub-iteration itself.
@@ -30,6 +30,7 @@ use crate::euler::EulerTable;
 use crate::lattice::Lattice;
 use crate::open::Open;
 use crate::restore;
+use crate::rough;
 use crate::simple::{is_corner, is_simple, n_neighbors};
 use crate::thinning::{Rule, sweep_until_stable};
 use crate::tips;
@@ -39,7 +40,10 @@ const LEVEL_STEP: u16 = (UNITS_PER_SPACING / 3.0) as u16;
 
 /// Thins in place; returns the number of sweeps.
 pub(crate) fn thin(lattice: &mut Lattice) -> usize {
-    let depths = Depths::of(lattice);
+    let depths = match rough::smooth(lattice) {
+        Some(filled) => Depths::of(&filled).within(lattice),
+        None => Depths::of(lattice),
+    };
     let mut open = Open::held(lattice);
     let rule = Safe { euler: EulerTable::get() };
     let mut n_sweeps = 0;
