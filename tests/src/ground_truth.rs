@@ -95,6 +95,15 @@ pub fn lost_tips(truth: &Tree, found: &Tree, spacing_mm: DVec3) -> Vec<usize> {
     tips
 }
 
+/// The free ends of the found tree that are none of the true tree's.
+#[must_use]
+pub fn false_tips(truth: &Tree, found: &Tree, spacing_mm: DVec3) -> Vec<usize> {
+    let (true_tips, mut tips) = (free_ends(truth), free_ends(found));
+    let pairs = matched((truth, &true_tips), (found, &tips), 2.0 * spacing_mm.max_element());
+    tips.retain(|tip| pairs.iter().all(|(_, matched)| matched != tip));
+    tips
+}
+
 /// One-to-one pairs of true and found nodes, nearest first, within max(`tolerance_mm`, the true radius).
 pub(crate) fn matched(
     (truth, true_nodes): (&Tree, &[usize]),

@@ -2,13 +2,13 @@
 //!
 //! **Input** the bits of a mask. **Output** the same with small changes, each of which closes a tunnel, and a ledger
 //! entry for each.
-//! **Notation** M the mask; S what a Gaussian blur of M and a threshold leave; a patch is a 26-connected piece of the
-//! voxels at which they differ; χ the Euler number, components − tunnels + cavities.
+//! **Notation** M the mask; S what a Gaussian blur of M and a threshold leave, and the pits of M; a patch is a
+//! 26-connected piece of the voxels at which they differ; χ the Euler number, components − tunnels + cavities.
 //! **Steps** 1. blur M by a Gaussian of σ = 0.7 voxel and cut at 0.45, at the voxels next to the surface: no other
 //! can change. 2. Where the cut takes away more than a voxel's depth, or a piece that is all that joins two others,
-//! it stands for a thin branch: put it back. 3. Of the patches take those that raise χ; at one voxel from each other
-//! they cannot meet in a 2×2×2 block, so their effects add up. 4. Leave out any that touch two components, and take back
-//! any that cut one in two.
+//! it stands for a thin branch: put it back. 3. Fill pits. 4. Of the patches take those that raise χ; at one voxel from
+//! each other they cannot meet in a 2×2×2 block, so their effects add up. 5. Leave out any that touch two components,
+//! and take back any that cut one in two.
 //! **Why not S itself?** Ends of thin branches vanish in it. A patch that changes no tunnel is left out, so they stay, and
 //! as many tunnels close.
 //! **Guarantees** no component is cut, and none joined with another; a mask without tunnels stays as it is; the result
@@ -17,6 +17,7 @@
 //! **Cost** 25 look-ups for each voxel next to the surface; memory of four masks and the runs of two.
 
 mod blur;
+mod pits;
 
 use espalier_model::{Bits, Grid, LedgerEntry, LedgerKind};
 use glam::DVec3;
@@ -81,6 +82,7 @@ impl Healed {
 pub(crate) fn heal(mask: &mut Bits, grid: &Grid) -> Healed {
     let mut smooth = blur(mask);
     keep_branches(mask, &mut smooth);
+    pits::fill(mask, &mut smooth);
     let patches = Patches::between(mask, &smooth);
     let mut is_taken = patches.raise_euler_number(mask);
     patches.leave_apart(mask, &mut is_taken);
@@ -249,7 +251,9 @@ impl Patches {
             position_mm: grid.world_from_voxel().transform_point3(sum / (filled + cleared) as f64),
             radius_mm: 0.0,
             length_mm: 0.0,
-            reason: format!("{filled} voxels filled, {cleared} cleared; a blur of 0.7 voxel closes it"),
+            reason: format!(
+                "{filled} voxels filled, {cleared} cleared; a blur of 0.7 voxel, or filling its pits, closes it"
+            ),
         };
         let mut entries: Vec<LedgerEntry> = taken.iter().take(MAX_LISTED).map(entry).collect();
         if taken.len() > MAX_LISTED {
@@ -337,6 +341,18 @@ mod tests {
         let mut is_taken = patches.raise_euler_number(&plate);
         patches.leave_apart(&plate, &mut is_taken);
         assert_eq!(is_taken, [true]);
+    }
+
+    /// A branch one slice thick, as on thick slices, in which a voxel is missing: a blur leaves the hole.
+    #[test]
+    fn a_hole_in_a_single_slice_closes() {
+        let mut slice = Bits::new([40, 9, 3]);
+        (2..7).for_each(|y| slice.fill_run(9 + y, 2..38));
+        let whole = slice.clone();
+        slice.clear([20, 4, 1]);
+        let healed = heal(&mut slice, &grid(&whole));
+        assert_eq!((healed.n_patches, healed.n_filled, healed.n_cleared), (1, 1, 0));
+        assert_eq!(slice, whole);
     }
 
     #[test]

@@ -4,10 +4,13 @@
 //! in the body (`clean`), the same with 15 % of its surface's voxels flipped (`rough`), and what region growing makes of
 //! its noisy CT (`ct`). Columns and tolerances are those of `espalier_tests::ground_truth`. Every tip of the truth
 //! counts; what a grid cannot show is part of the figure.
-//! `--only WORD` takes the rows that hold the word, `--small` one grid; `--lost` lists each tip that was not found, with
+//! `--only WORD` takes the rows that hold the word, `--small` one grid, `--seed N` another tree of each kind than that of seed 7;
+//! `--false` lists each tip that is not true, with its branch, `--lost` each tip that was not found, with
 //! what lies nearest to it.
 #![allow(clippy::print_stdout, clippy::print_stderr, clippy::disallowed_methods, reason = "a program")]
 
+mod bands;
+mod false_tips;
 mod lost_tips;
 
 use std::process::ExitCode;
@@ -20,19 +23,28 @@ fn main() -> ExitCode {
     let grids: &[[f64; 3]] =
         if arguments.iter().any(|word| word == "--small") { &GRIDS_MM[2..3] } else { &GRIDS_MM };
     let is_lost_listed = arguments.iter().any(|word| word == "--lost");
+    let is_false_listed = arguments.iter().any(|word| word == "--false");
+    let seed =
+        arguments.iter().position(|word| word == "--seed").and_then(|at| arguments.get(at + 1)?.parse().ok());
     println!("{}", phantoms::HEADING);
     for &spacing_mm in grids {
         for kind in phantoms::KINDS {
             for scan in Scan::ALL {
-                let case = Case { kind, spacing_mm, scan, seed: 7 };
+                let case = Case { kind, spacing_mm, scan, seed: seed.unwrap_or(7) };
                 if only.is_some_and(|word| !case.to_string().contains(word.as_str())) {
                     continue;
                 }
                 match phantoms::measure(&case) {
                     Ok(measured) => {
                         println!("{measured}");
+                        if case.scan == Scan::Ct {
+                            bands::print(&measured);
+                        }
                         if is_lost_listed {
                             lost_tips::print(&measured);
+                        }
+                        if is_false_listed {
+                            false_tips::print(&measured);
                         }
                     }
                     Err(error) => {
