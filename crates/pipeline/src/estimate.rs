@@ -3,8 +3,9 @@
 //! **Input** the sizes that a stage depends on, as far as they are known. **Output** [`Cost`].
 //! **Steps** each cost is a sum of sizes, each times a constant of the table below.
 //! **Guarantees** no result depends on it, but that a stage is refused which would take more memory than allowed.
-//! **Source** the constants: least squares of the logarithm on the runs of `scripts/estimates`, which prints what was
-//! measured beside what this says. Seconds are those of one core of 2.1 GHz; memory does not depend on the machine.
+//! **Source** the constants: chosen on eleven runs by `scripts/estimates`, which prints what was measured beside what this
+//! says. Of a whole run both lie within a factor of 2 there, seconds from 0.5 to 2.0 and memory from 0.7 to 1.3; a layout
+//! that is proven optimal early takes a third of what is said. Seconds depend on the machine, memory does not.
 
 use espalier_geom::math;
 use espalier_model::{Mask, Tree};
@@ -45,9 +46,9 @@ pub struct Cost {
 /// The program itself, and the buffers of its threads.
 const PROGRAM_BYTES: f64 = 16e6;
 /// Skeleton voxels per foreground voxel, where thinning has not told.
-const SKELETON_PER_FOREGROUND: f64 = 0.017;
+const SKELETON_PER_FOREGROUND: f64 = 0.022;
 /// Nodes per skeleton voxel, where no tree has told.
-const NODES_PER_SKELETON: f64 = 0.5;
+const NODES_PER_SKELETON: f64 = 0.4;
 /// The height of a map over its width, where the layout has not told: the middle of what a page may have.
 const ASPECT: f64 = 1.2;
 
@@ -118,15 +119,15 @@ fn constants(stage: Stage) -> [PerSize; 2] {
             PerSize { voxel: 0.3, held: 6.0, foreground: 4.0, ..none },
         ],
         Stage::Skeleton => [
-            PerSize { fixed: 0.01, voxel: 1.3e-9, foreground: 9e-7, ..none },
+            PerSize { fixed: 0.01, voxel: 7e-10, foreground: 7e-7, ..none },
             PerSize { voxel: 0.3, boxed: 1.0, foreground: 12.0, ..none },
         ],
         Stage::Radius => [
-            PerSize { fixed: 0.01, voxel: 2.2e-9, foreground: 3e-7, ..none },
+            PerSize { fixed: 0.01, voxel: 9e-10, foreground: 3e-7, ..none },
             PerSize { voxel: 0.3, boxed: 1.0, foreground: 12.0, ..none },
         ],
         Stage::Tree => [
-            PerSize { fixed: 0.01, voxel: 2e-9, foreground: 3e-7, node: 6e-6, ..none },
+            PerSize { fixed: 0.01, voxel: 5e-10, foreground: 1.5e-7, node: 6e-6, ..none },
             PerSize { voxel: 0.3, foreground: 25.0, node: 300.0, ..none },
         ],
         Stage::Views => [PerSize { fixed: 0.01, node: 3.5e-5, ..none }, PerSize { node: 300.0, ..none }],
@@ -136,7 +137,7 @@ fn constants(stage: Stage) -> [PerSize; 2] {
             PerSize { fixed: 14e6, foreground: 11.0, node: 1000.0, pixel: 5.8, organ_pixel: 19.0, ..none },
         ],
         Stage::Report => [
-            PerSize { fixed: 0.03, voxel: 1e-9, node: 1e-5, ..none },
+            PerSize { fixed: 0.03, voxel: 3e-10, node: 1e-5, ..none },
             PerSize { voxel: 0.15, node: 1200.0, ..none },
         ],
     }
