@@ -2,6 +2,7 @@
 
 pub mod degenerate;
 pub mod ground_truth;
+pub mod hostile;
 pub mod peer_ends;
 
 use std::fmt::Display;

@@ -8,9 +8,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use espalier_pipeline::{Event, Stage};
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Prints a line to standard error. A closed standard error is no reason to stop.
+/// Prints a line to standard error. A closed standard error is no reason to stop. A message quotes files and their names:
+/// what in them would drive a terminal is shown as a sign of replacement.
 pub(crate) fn line(text: &str) {
-    let _ = writeln!(std::io::stderr(), "{text}");
+    let drives = |letter: char| letter.is_control() && !matches!(letter, '\n' | '\t');
+    let _ = writeln!(std::io::stderr(), "{}", text.replace(drives, "\u{FFFD}"));
 }
 
 /// Whether a line of results was lost.

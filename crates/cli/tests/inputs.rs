@@ -55,6 +55,10 @@ fn labels_go_by_the_users_own_names() {
     fs::write(folder.path().join("names.ctbl"), "10 left_lung\ntwenty heart\n").expect("write");
     let (code, text) = run("heart");
     assert!(code == Some(3) && text.contains("names.ctbl") && text.contains("line 2"), "{text}");
+    // What a file holds does not reach the terminal as it is.
+    fs::write(folder.path().join("names.ctbl"), "10 left_lung\n\u{1b}[31mred\u{7}\n").expect("write");
+    let (code, text) = run("heart");
+    assert!(code == Some(3) && text.contains("[31mred") && !text.contains(['\u{1b}', '\u{7}']), "{text:?}");
     let nowhere = ["volume", "map.mhd", "-o", "out", "--labels", "nowhere.txt", "--label", "heart"];
     assert_eq!(said(&folder, &nowhere).0, Some(74));
 }

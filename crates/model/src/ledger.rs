@@ -113,7 +113,7 @@ impl Ledger {
         let entry = |(line_idx, line): (usize, &str)| {
             parse_entry(line).ok_or_else(|| FileError::Invalid {
                 format: "topology.tsv",
-                what: format!("line {} is no entry of a ledger: {line}", line_idx + 1),
+                what: format!("line {} is no entry of a ledger: {line:.60}", line_idx + 1),
             })
         };
         text.lines().enumerate().skip(1).map(entry).collect::<Result<_, _>>().map(Self)

@@ -9,14 +9,16 @@
 //! **Input** bytes, and how the file's numbers become mm. **Output** [`Polylines`].
 //! **Steps** 1. the format by its first bytes; 2. its arrays; 3. radii by their array's name; 4. the space that the file
 //! states, or else the one that the caller names; 5. RAS+ mm.
-//! **Guarantees** those of [`Polylines`]; each array is bounded by what the file can hold when unpacked, but not
-//! their sum: pieces may share bytes; no recursion; no byte makes it panic.
+//! **Guarantees** those of [`Polylines`]; all that is made of a file, its text included, is within the memory that the
+//! caller allows, checked before it is made; no recursion; no byte makes it panic.
 //! **Source** "VTK File Formats", docs.vtk.org; VMTK's documentation for the names of its arrays.
 
 mod encoded;
 mod error;
 mod legacy;
 mod xml;
+
+use std::cell::Cell;
 
 use glam::DVec3;
 
@@ -27,6 +29,12 @@ use crate::{MAX_MM, RAS_FROM_LPS, Report};
 
 /// The names of radius arrays, best first: VMTK's, ours, and what others write.
 const RADIUS_NAMES: [&str; 4] = ["MaximumInscribedSphereRadius", "radius_mm", "Radius", "radius"];
+
+/// What a number takes while a file is read, at most: in its own array, in that of all pieces, and in a point, a radius or
+/// a line.
+const BYTES_OF_NUMBER: u64 = 32;
+/// What a line takes beside its points, in numbers.
+const NUMBERS_OF_LINE: usize = 3;
 
 /// Lines through points that have radii.
 ///
@@ -63,6 +71,28 @@ pub fn is_polydata(bytes: &[u8]) -> bool {
         || (start.starts_with(b"<?xml") && start.windows(8).any(|word| word == b"<VTKFile"))
 }
 
+/// How many more numbers may be made of a file.
+#[derive(Debug)]
+pub(crate) struct Budget {
+    n_left: Cell<usize>,
+    limit: u64,
+}
+
+impl Budget {
+    /// What the memory of `max_bytes` leaves beside a file's bytes and their text.
+    fn of(max_bytes: u64, n_file: usize) -> Self {
+        let left = max_bytes.saturating_sub(2 * n_file as u64);
+        Self { n_left: Cell::new((left / BYTES_OF_NUMBER) as usize), limit: max_bytes }
+    }
+
+    /// Takes so many numbers off what is left.
+    fn spend(&self, n_numbers: usize) -> Result<(), PolydataError> {
+        let n_left = self.n_left.get().checked_sub(n_numbers);
+        self.n_left.set(n_left.ok_or(PolydataError::TooLarge { limit: self.limit })?);
+        Ok(())
+    }
+}
+
 /// What both formats come to.
 #[derive(Debug, Default)]
 pub(crate) struct Dataset {
@@ -85,7 +115,7 @@ pub(crate) struct Dataset {
 }
 
 /// Reads the bytes of a VTK file of lines. `scale` is mm for a step in the file's coordinates, as they stand there;
-/// `assumed` is the space of a file that does not name it.
+/// `assumed` is the space of a file that does not name it; `max_bytes` is the memory that may be taken.
 ///
 /// # Errors
 /// [`PolydataError`] with the place.
@@ -93,10 +123,15 @@ pub fn parse(
     bytes: &[u8],
     scale: &SwcScale,
     assumed: Option<RasSigns>,
+    max_bytes: u64,
 ) -> Result<(Polylines, Report), PolydataError> {
     let start = bytes.trim_ascii_start();
-    let dataset =
-        if start.starts_with(b"# vtk DataFile") { legacy::parse(start)? } else { xml::parse(bytes)? };
+    let budget = Budget::of(max_bytes, bytes.len());
+    let dataset = if start.starts_with(b"# vtk DataFile") {
+        legacy::parse(start, &budget)?
+    } else {
+        xml::parse(bytes, &budget)?
+    };
     let mut report = Report::default();
     if let Some(place) = &dataset.unread {
         report.warn("W-POLYDATA-UNREAD", format!("what follows {place} is not read"));

@@ -15,7 +15,7 @@ mod write;
 use glam::DVec3;
 
 pub use error::SwcError;
-pub use parse::parse;
+pub use parse::{memory_bytes, parse};
 pub use write::{header_value, is_own, read_tree, write};
 
 /// One line of an SWC file, scaled to mm.

@@ -12,7 +12,7 @@ use crate::tree::Tree;
 #[non_exhaustive]
 pub enum FileError {
     /// Not JSON, or not of this shape.
-    #[error("not a readable {format} file: {source}")]
+    #[error("not a readable {format} file: {}", brief(source))]
     Malformed {
         /// The format expected.
         format: &'static str,
@@ -20,7 +20,9 @@ pub enum FileError {
         source: serde_json::Error,
     },
     /// Another format, or another version of it.
-    #[error("a file of format {found_format} version {found_version}, expected {format} version {version}")]
+    #[error(
+        "a file of format {found_format:.40} version {found_version}, expected {format} version {version}"
+    )]
     Unknown {
         /// The format expected.
         format: &'static str,
@@ -32,7 +34,7 @@ pub enum FileError {
         found_version: u32,
     },
     /// Well formed, but an invariant of the data does not hold.
-    #[error("{format} file breaks an invariant: {what}")]
+    #[error("{format} file breaks an invariant: {what:.300}")]
     Invalid {
         /// The format expected.
         format: &'static str,
@@ -49,6 +51,19 @@ pub enum FileError {
         /// The digest of this tree.
         expected: String,
     },
+}
+
+/// How much of what a parser says is shown: it quotes the file, whose words may be of any length.
+const N_SHOWN: usize = 240;
+
+/// What a parser says, with the place.
+fn brief(error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    if text.len() <= N_SHOWN {
+        return text;
+    }
+    let start: String = text.chars().take(N_SHOWN).collect();
+    format!("{start}… at line {} column {}", error.line(), error.column())
 }
 
 impl Diagnose for FileError {

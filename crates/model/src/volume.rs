@@ -78,6 +78,12 @@ impl Volume {
         &self.voxels
     }
 
+    /// The bytes of its numbers.
+    #[must_use]
+    pub fn n_bytes(&self) -> u64 {
+        with_array!(&self.voxels, array => size_of_val(array.as_slice().unwrap_or_default()) as u64)
+    }
+
     /// Slope and intercept of the scaling.
     #[must_use]
     pub fn scaling(&self) -> (f64, f64) {

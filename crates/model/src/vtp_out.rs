@@ -149,7 +149,7 @@ mod tests {
         let text = write(&tree, &Anatomy::default());
         let scale = crate::swc::SwcScale::millimetres();
         // It names its space: none has to be assumed.
-        let (read, _) = crate::polydata::parse(text.as_bytes(), &scale, None).expect("polylines");
+        let (read, _) = crate::polydata::parse(text.as_bytes(), &scale, None, 1 << 30).expect("polylines");
         for (node, data) in tree.nodes().iter().enumerate() {
             assert_eq!((read.points_mm[node], read.radii_mm[node]), (data.position_mm, data.radius_mm));
         }

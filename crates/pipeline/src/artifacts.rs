@@ -172,13 +172,17 @@ impl Artifacts {
         self.is_unit_guessed = self.input.unit == Unit::Auto && self.input.scale == [1.0; 3] && !is_mm;
         let (traced, report) = if is_polydata {
             let assumed = self.input.assume_space.map(espalier_volume::AssumedSpace::ras_signs);
-            let parsed =
-                polydata::parse(&bytes, &scale, assumed).map_err(|error| Error::file(&path, error))?;
+            let parsed = polydata::parse(&bytes, &scale, assumed, self.read_options.max_bytes)
+                .map_err(|error| Error::file(&path, error))?;
             let (traced, joined) = espalier_tree::join_lines(&parsed.0);
             let mut report = parsed.1;
             report.extend(joined);
             (traced, report)
         } else {
+            let (needed, limit) = (swc::memory_bytes(&bytes), self.read_options.max_bytes);
+            if needed > limit {
+                return Err(Error::TooLarge { path, needed, limit });
+            }
             swc::parse(&bytes, &scale).map_err(|error| Error::file(&path, error))?
         };
         let traced = Arc::new(traced);

@@ -12,7 +12,7 @@ use espalier_tree::join_lines;
 use glam::DVec3;
 
 fn read(bytes: &[u8]) -> Result<Polylines, String> {
-    parse(bytes, &SwcScale::millimetres(), Some(DVec3::ONE))
+    parse(bytes, &SwcScale::millimetres(), Some(DVec3::ONE), 1 << 30)
         .map(|(lines, _)| lines)
         .map_err(|error| error.code().to_owned())
 }
@@ -115,7 +115,7 @@ fn every_encoding_of_vtk() {
     let expected = read(XML.as_bytes()).expect("XML");
     for (index, bytes) in BY_VTK.into_iter().enumerate() {
         assert!(is_polydata(bytes), "{index}");
-        let parsed = parse(bytes, &SwcScale::millimetres(), lps);
+        let parsed = parse(bytes, &SwcScale::millimetres(), lps, 1 << 30);
         let (lines, report) = parsed.unwrap_or_else(|error| panic!("{index}: {error}"));
         assert_eq!((&lines, report.warnings.len()), (&expected, 0), "{index}: {:?}", report.warnings);
     }
@@ -136,7 +136,7 @@ fn what_is_wrong_has_a_name() {
     assert_eq!(code("0 0 5", "0 0 nan"), "E-POLYDATA-POINT");
     assert_eq!(code("format=\"ascii\">3 1", "format=\"binary\">3 1"), "E-POLYDATA-BYTES");
     let unplaced = XML.replace("76 80 83 0", "");
-    let error = parse(unplaced.as_bytes(), &SwcScale::millimetres(), None).expect_err("no space");
+    let error = parse(unplaced.as_bytes(), &SwcScale::millimetres(), None, 1 << 30).expect_err("no space");
     assert_eq!((error.code(), error.class().exit_code()), ("E-POLYDATA-NO-SPACE", 3));
     assert!(error.hint().contains("input.assume_space"), "{}", error.hint());
 }

@@ -5,7 +5,8 @@
 //! **Steps** 1. the box in voxels, one more on each side for what interpolates between them; 2. the voxels straight from
 //! the file, of which only those are kept; 3. DICOM slices, and volumes whose axes must be made orthogonal, are read
 //! whole first.
-//! **Guarantees** straight from the file, memory is the box; its size is checked before it is allocated.
+//! **Guarantees** straight from the file, memory is the box, else the volume and the box; checked before either is
+//! allocated.
 //! **Cost** one pass over the file.
 
 use std::path::Path;
@@ -55,7 +56,10 @@ pub fn read_box(path: &Path, options: &ReadOptions, corners_mm: [DVec3; 2]) -> R
     let whole = read(path, options)?;
     let grid = whole.volume.grid();
     let part = Part::of(grid, corners_mm);
-    let mut kept = Vec::new();
+    let mut kept = match &part {
+        Some(part) => part.room(whole.volume.n_bytes(), options).map_err(named)?,
+        None => Vec::new(),
+    };
     let mut index = 0;
     whole.volume.for_each_value(|value| {
         if part.as_ref().is_some_and(|part| part.holds(grid.voxel(index))) {
@@ -125,16 +129,22 @@ impl Part {
         self.shape.iter().product()
     }
 
+    /// Room for its values, beside what is held already.
+    fn room(&self, n_held: u64, options: &ReadOptions) -> Result<Vec<f32>, ReadError> {
+        let needed = (self.n_voxels() as u64).saturating_mul(size_of::<f32>() as u64);
+        check_limit(needed.saturating_add(n_held), options)?;
+        let mut kept = Vec::new();
+        kept.try_reserve_exact(self.n_voxels()).map_err(|_| ReadError::NoMemory { needed })?;
+        Ok(kept)
+    }
+
     /// Its values, from a stream that stands at the first voxel of the whole.
     fn read(
         &self,
         stored: &mut Stored,
         (options, report): (&ReadOptions, &mut Report),
     ) -> Result<Vec<f32>, ReadError> {
-        let needed = (self.n_voxels() as u64).saturating_mul(size_of::<f32>() as u64);
-        check_limit(needed, options)?;
-        let mut kept: Vec<f32> = Vec::new();
-        kept.try_reserve_exact(self.n_voxels()).map_err(|_| ReadError::NoMemory { needed })?;
+        let mut kept = self.room(0, options)?;
         let (slope, intercept) = (stored.slope, stored.intercept);
         macro_rules! rows {
             ($file_type:ty) => {{

@@ -238,7 +238,7 @@ fn warn_if_orientation_disagrees(keys: &Keys, ras_from_voxel: DMat3, report: &mu
     if disagrees {
         report.warn(
             "W-META-ORIENTATION",
-            format!("AnatomicalOrientation {stated} is not what TransformMatrix says, which is used"),
+            format!("AnatomicalOrientation {stated:.20} is not what TransformMatrix says, which is used"),
         );
     }
 }

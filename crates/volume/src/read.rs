@@ -18,6 +18,9 @@ use crate::dicom::{self, Assembled};
 use crate::stored::Stored;
 use crate::{Error, ReadError, ReadOptions, decode, orthogonal};
 
+/// What the decompressor and the buffers take beside the voxels.
+const BUFFER_BYTES: u64 = 256 << 10;
+
 /// A volume as it stands in a file, and what was seen on the way.
 #[derive(Clone, Debug)]
 pub struct Loaded {
@@ -56,7 +59,7 @@ fn read_any(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
         return read_dicom(path, options, report);
     }
     let mut stored = Stored::open(path, options, &mut report)?;
-    check_limit(stored.memory_bytes(), options)?;
+    check_limit(stored.memory_bytes().saturating_add(BUFFER_BYTES), options)?;
 
     // Place the voxels in the world, which may fail, before reading them, which takes time.
     let grid = orthogonal_grid(&stored, options)?;

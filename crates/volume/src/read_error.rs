@@ -129,7 +129,7 @@ pub enum ReadError {
         expected: &'static str,
     },
     /// A type of numbers that is no scalar.
-    #[error("the voxels are {what} ({stated}), espalier reads real numbers of 8 to 64 bits")]
+    #[error("the voxels are {what} ({stated:.100}), espalier reads real numbers of 8 to 64 bits")]
     NotScalar {
         /// What they are.
         what: &'static str,
@@ -162,7 +162,7 @@ pub enum ReadError {
         readings: &'static str,
     },
     /// The numbers that place the volume in space are no legal transform.
-    #[error("the {form} is not usable: {problem}")]
+    #[error("the {form} cannot be used: {problem}")]
     Form {
         /// Which numbers.
         form: &'static str,
@@ -170,7 +170,7 @@ pub enum ReadError {
         problem: String,
     },
     /// The voxel grid is not legal.
-    #[error("the {form} is not usable: {problem}")]
+    #[error("the {form} cannot be used: {problem}")]
     Grid {
         /// Which numbers.
         form: &'static str,

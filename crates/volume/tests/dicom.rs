@@ -5,7 +5,7 @@ mod slices;
 
 use espalier_geom::random::{Purpose, Stream};
 use espalier_model::{Diagnose, Volume};
-use espalier_volume::{DicomError, Error, Loaded, ReadError, ReadOptions, files, read};
+use espalier_volume::{DicomError, Error, Loaded, ReadError, ReadOptions, files, read, read_box};
 use glam::DVec3;
 use slices::{Slice, stack, write};
 
@@ -386,4 +386,30 @@ fn deflated_slices_are_the_same_scan() {
     let cut: Vec<Vec<u8>> = files.iter().map(|file| file[..file.len() - 30].to_vec()).collect();
     write(&cut);
     assert_eq!(dicom_error(read(folder.path(), &ReadOptions::default())).class().exit_code(), 3);
+}
+
+/// A file is read by the piece; where an element ends with the first piece, the pixels are in the next.
+#[test]
+fn an_element_may_end_where_a_piece_does() {
+    const PIECE: usize = 64 << 10;
+    let padded = |z: f64, n_bytes: usize| Slice::at(z).with(0x0009_1010, "OB", &vec![7; n_bytes]);
+    let bytes = padded(0.0, 2).bytes();
+    let head = bytes.windows(6).position(|six| six == b"\x09\x00\x10\x10OB").expect("the element");
+    let slices = [0.0, 1.0].map(|z| padded(z, PIECE - head - 12));
+    assert_eq!(&slices[0].bytes()[PIECE..PIECE + 4], &[0x10, 0x00, 0x10, 0x00], "an element begins here");
+    assert_eq!(loaded(&slices).volume, loaded(&stack(&[0.0, 1.0])).volume);
+}
+
+/// The part of a series that is asked for is held beside the whole: both count.
+#[test]
+fn a_part_counts_beside_the_whole() {
+    let folder = scratch();
+    let heights: Vec<f64> = (0..64).map(f64::from).collect();
+    write(folder.path(), &stack(&heights), |index| format!("{index}.dcm"));
+    let corners = [DVec3::splat(-1e3), DVec3::splat(1e3)];
+    // 64 slices of 30 pixels of 2 bytes, and what decoding one takes, are within 6000 bytes; the same in 4 bytes is not.
+    let options = ReadOptions { max_bytes: 6000, ..ReadOptions::default() };
+    assert!(read(folder.path(), &options).is_ok());
+    let error = read_box(folder.path(), &options, corners).map(drop).expect_err("too large");
+    assert_eq!(error.code(), "E-VOLUME-TOO-LARGE");
 }

@@ -116,7 +116,8 @@ fn parse_json(text: &str) -> Result<BTreeMap<i64, String>, FileError> {
             _ => None,
         };
         let pair = pair.and_then(|(value, name)| Some((value?, name))).filter(|(_, name)| !name.is_empty());
-        pair.ok_or_else(|| invalid(format!("the entry {key:?} is no whole number and name")))
+        let shown = || key.chars().take(60).collect::<String>();
+        pair.ok_or_else(|| invalid(format!("the entry {:?} is no whole number and name", shown())))
     };
     entries.map(entry).collect()
 }

@@ -38,7 +38,7 @@ pub enum PolydataError {
         found: String,
     },
     /// Another number of values than declared.
-    #[error("{what} has {found} values, expected {expected}")]
+    #[error("{what:.40} has {found} values, expected {expected}")]
     Count {
         /// Of what.
         what: String,
@@ -77,6 +77,12 @@ pub enum PolydataError {
         /// How many.
         n_other_cells: usize,
     },
+    /// More numbers than memory allows.
+    #[error("its points, lines and arrays need more than the {limit} bytes of memory that are allowed")]
+    TooLarge {
+        /// How many are allowed.
+        limit: u64,
+    },
     /// The space is not named.
     #[error("the file does not say whether its coordinates are RAS or LPS, which differ by half a turn")]
     NoSpace,
@@ -94,18 +100,23 @@ impl Diagnose for PolydataError {
             Self::Point { .. } => "E-POLYDATA-POINT",
             Self::MissingPoint { .. } => "E-POLYDATA-MISSING-POINT",
             Self::NoLines { .. } => "E-POLYDATA-NO-LINES",
+            Self::TooLarge { .. } => "E-POLYDATA-TOO-LARGE",
             Self::NoSpace => "E-POLYDATA-NO-SPACE",
         }
     }
 
     fn class(&self) -> Class {
-        Class::Input
+        match self {
+            Self::TooLarge { .. } => Class::Limit,
+            _ => Class::Input,
+        }
     }
 
     fn hint(&self) -> String {
         match self {
             Self::Unknown { .. } => "write the lines as PolyData, .vtp or legacy .vtk, without compression or with zlib",
             Self::Point { .. } => "check the numbers, and the unit that the file is read in",
+            Self::TooLarge { .. } => "allow more with `--max-memory`, if the file is what it should be",
             Self::NoLines { .. } => "give centrelines, not the surface; VMTK makes them with vmtkcenterlines",
             Self::NoSpace => {
                 "say which: `--set input.assume_space=ras`, or lps, or `assume_space` under [input]; VTK files of ITK \

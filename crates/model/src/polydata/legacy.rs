@@ -3,13 +3,13 @@
 //! **Input** bytes. **Output** [`Dataset`].
 //! **Steps** 1. version, title, ascii or binary; 2. keyword by keyword: points, cells of versions before and from 5, arrays
 //! of points and cells; 3. at a keyword that is not known, reading ends, and the caller is told.
-//! **Guarantees** a count is compared with the bytes that are left before anything is made of it; numbers of binary files
-//! are big-endian.
+//! **Guarantees** a count is compared with the bytes and the memory that are left before anything is made of it; numbers of
+//! binary files are big-endian.
 
-use super::{Dataset, PolydataError};
+use super::{Budget, Dataset, NUMBERS_OF_LINE, PolydataError};
 
-pub(super) fn parse(bytes: &[u8]) -> Result<Dataset, PolydataError> {
-    let mut cursor = Cursor { rest: bytes, is_binary: false };
+pub(super) fn parse(bytes: &[u8], budget: &Budget) -> Result<Dataset, PolydataError> {
+    let mut cursor = Cursor { rest: bytes, is_binary: false, budget };
     cursor.line();
     let title = String::from_utf8_lossy(cursor.line()).into_owned();
     cursor.is_binary = match cursor.word() {
@@ -127,6 +127,7 @@ fn keep(dataset: &mut Dataset, about: &About, name: String, n_components: usize,
 /// Cells as lists of points: from version 5 as offsets and points, before as lengths and points.
 fn cells(cursor: &mut Cursor<'_>) -> Result<Vec<Vec<usize>>, PolydataError> {
     let (n_first, n_second) = (cursor.count()?, cursor.count()?);
+    cursor.budget.spend(n_first.saturating_mul(NUMBERS_OF_LINE))?;
     let index = |&number: &f64| if number >= 0.0 { number as usize } else { usize::MAX };
     if cursor.peek().as_deref() == Some("OFFSETS") {
         cursor.word();
@@ -150,6 +151,9 @@ fn cells(cursor: &mut Cursor<'_>) -> Result<Vec<Vec<usize>>, PolydataError> {
         let cell = after.split_at_checked(index(length));
         let (cell, after) =
             cell.ok_or(PolydataError::Missing { what: "point for each corner of the cells" })?;
+        if cells.len() == n_first {
+            return Err(PolydataError::Missing { what: "count of cells that is as large as their list" });
+        }
         cells.push(cell.iter().map(index).collect());
         rest = after;
     }
@@ -167,6 +171,7 @@ fn unknown(what: &'static str, word: Option<String>) -> PolydataError {
 struct Cursor<'a> {
     rest: &'a [u8],
     is_binary: bool,
+    budget: &'a Budget,
 }
 
 impl<'a> Cursor<'a> {
@@ -224,6 +229,7 @@ impl<'a> Cursor<'a> {
             let found = self.rest.len();
             return Err(PolydataError::Count { what: scalar, found, expected: n_numbers });
         }
+        self.budget.spend(n_numbers)?;
         if !self.is_binary {
             return (0..n_numbers).map(|_| self.number()).collect();
         }

@@ -4,14 +4,16 @@
 //! **Steps** 1. appended bytes, which are no XML, are cut out; 2. the XML; 3. of each piece the points, the lines, and
 //! the arrays that are used; 4. pieces one after another.
 //! **Guarantees** declared counts are compared with what the bytes can hold before anything is made of them, and all
-//! pieces together make no more than [`MAX_NUMBERS`] of compressed ones; external entities are not resolved.
+//! pieces together with the memory that is left; arrays that share bytes are refused where that would take long; external
+//! entities are not resolved.
 
+use std::borrow::Cow;
 use std::cell::Cell;
 
-use roxmltree::{Document, Node};
+use roxmltree::{Document, Node, ParsingOptions};
 
 use super::encoded::{self, Encoding};
-use super::{Dataset, PolydataError, RADIUS_NAMES};
+use super::{Budget, Dataset, NUMBERS_OF_LINE, PolydataError, RADIUS_NAMES};
 
 /// A file, and how it writes its arrays.
 struct File<'a> {
@@ -22,21 +24,37 @@ struct File<'a> {
     /// Where arrays begin in them, ascending.
     offsets: Vec<usize>,
     n_bytes: usize,
-    /// How many more numbers its arrays may make, all pieces together.
-    n_left: Cell<usize>,
+    /// How many more numbers its arrays may make, all pieces together: they may name the same compressed bytes.
+    budget: &'a Budget,
+    /// How many more appended bytes may be looked at.
+    n_to_see: Cell<usize>,
 }
 
-/// Arrays of numbers that no file of polylines has: 1 GiB. Several pieces may name the same compressed bytes, so that
-/// what each of them makes is not bounded by the file.
-const MAX_NUMBERS: usize = 1 << 27;
+/// Appended bytes may be looked at so often, all arrays together. No program lets arrays share them.
+const MAX_SHARED: usize = 4;
+/// A file of polylines has some tens of elements, one of many pieces some thousands; each takes a hundred bytes, and the
+/// parser makes room for as many as there are signs before it looks at one.
+const MAX_NODES: u32 = 1 << 18;
+/// What an element or an attribute takes, in numbers of the budget.
+const NUMBERS_OF_NODE: usize = 4;
+/// The parser compares each attribute of an element with all others; none that VTK writes is a tenth as long.
+const MAX_TAG_BYTES: usize = 4096;
+/// How much of what a parser says is shown.
+const N_SHOWN: usize = 200;
 
-pub(super) fn parse(bytes: &[u8]) -> Result<Dataset, PolydataError> {
+pub(super) fn parse(bytes: &[u8], budget: &Budget) -> Result<Dataset, PolydataError> {
     let (text, appended) = cut_appended(bytes);
-    let text = String::from_utf8_lossy(&text).into_owned();
-    let document = Document::parse(&text).map_err(|error| PolydataError::Xml { cause: error.to_string() })?;
+    let text = String::from_utf8_lossy(&text);
+    check_tags(&text, budget)?;
+    let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
+    let document = Document::parse_with_options(&text, options).map_err(|error| {
+        let printable =
+            error.to_string().chars().filter(|letter| !letter.is_control()).take(N_SHOWN).collect();
+        PolydataError::Xml { cause: printable }
+    })?;
     let root = document.root_element();
     if root.tag_name().name() != "VTKFile" || root.attribute("type") != Some("PolyData") {
-        let found = root.attribute("type").unwrap_or_else(|| root.tag_name().name()).to_owned();
+        let found = shown(root.attribute("type").unwrap_or_else(|| root.tag_name().name()));
         return Err(PolydataError::Unknown { what: "a VTK file of this type", found });
     }
     let file = File {
@@ -46,7 +64,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Dataset, PolydataError> {
             == Some("raw"),
         offsets: offsets(root),
         n_bytes: bytes.len(),
-        n_left: Cell::new(MAX_NUMBERS),
+        budget,
+        n_to_see: Cell::new(bytes.len().saturating_mul(MAX_SHARED)),
     };
     let mut dataset = Dataset { space: space(root), ..Dataset::default() };
     for piece in root.descendants().filter(|node| node.has_tag_name("Piece")) {
@@ -55,8 +74,28 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Dataset, PolydataError> {
     Ok(dataset)
 }
 
+fn shown(text: &str) -> String {
+    text.chars().take(40).collect()
+}
+
+/// Refuses more elements, and elements with more attributes, than there are in any file.
+fn check_tags(text: &str, budget: &Budget) -> Result<(), PolydataError> {
+    let n_signs = |sign: u8| text.bytes().filter(|&byte| byte == sign).count();
+    let is_long = |tag: &str| tag.len() > MAX_TAG_BYTES && !tag.starts_with(['!', '?']);
+    let tag = |part: &str| part.split('>').next().is_some_and(is_long);
+    budget.spend((n_signs(b'<') + n_signs(b'=')) * NUMBERS_OF_NODE)?;
+    let cause = if n_signs(b'<').max(n_signs(b'=')) > MAX_NODES as usize {
+        format!("it has more than {MAX_NODES} elements or attributes")
+    } else if text.split('<').skip(1).any(tag) {
+        format!("it has an element with more than {MAX_TAG_BYTES} bytes of attributes")
+    } else {
+        return Ok(());
+    };
+    Err(PolydataError::Xml { cause })
+}
+
 /// The XML without the bytes that are appended to it, and those.
-fn cut_appended(bytes: &[u8]) -> (Vec<u8>, Option<&[u8]>) {
+fn cut_appended(bytes: &[u8]) -> (Cow<'_, [u8]>, Option<&[u8]>) {
     let find = |needle: &[u8], from: usize| {
         bytes[from..].windows(needle.len()).position(|window| window == needle).map(|at| at + from)
     };
@@ -69,21 +108,21 @@ fn cut_appended(bytes: &[u8]) -> (Vec<u8>, Option<&[u8]>) {
     };
     match cut() {
         Some((tag_end, start, end)) => {
-            ([&bytes[..tag_end], &bytes[end..]].concat(), Some(&bytes[start..end]))
+            (Cow::Owned([&bytes[..tag_end], &bytes[end..]].concat()), Some(&bytes[start..end]))
         }
-        None => (bytes.to_vec(), None),
+        None => (Cow::Borrowed(bytes), None),
     }
 }
 
 fn encoding(root: Node<'_, '_>) -> Result<Encoding, PolydataError> {
     let compressor = root.attribute("compressor").unwrap_or_default();
     if !matches!(compressor, "" | "vtkZLibDataCompressor") {
-        return Err(PolydataError::Unknown { what: "this compression", found: compressor.to_owned() });
+        return Err(PolydataError::Unknown { what: "this compression", found: shown(compressor) });
     }
     let word_bytes = match root.attribute("header_type").unwrap_or("UInt32") {
         "UInt32" => 4,
         "UInt64" => 8,
-        found => return Err(PolydataError::Unknown { what: "this header_type", found: found.to_owned() }),
+        found => return Err(PolydataError::Unknown { what: "this header_type", found: shown(found) }),
     };
     Ok(Encoding {
         is_big_endian: root.attribute("byte_order") == Some("BigEndian"),
@@ -184,6 +223,7 @@ fn read_lines(
             .find(|node| node.attribute("Name") == Some(name))
             .ok_or(PolydataError::Missing { what: "array of lines" })
     };
+    file.budget.spend(n_lines.saturating_mul(NUMBERS_OF_LINE))?;
     let offsets = file.numbers(array("offsets")?, n_lines)?;
     let n_all = offsets.last().copied().unwrap_or(0.0);
     if !(0.0..=(file.n_bytes as f64 * 1032.0)).contains(&n_all) {
@@ -209,34 +249,34 @@ fn read_lines(
 impl File<'_> {
     /// The `expected` numbers of an array.
     fn numbers(&self, array: Node<'_, '_>, expected: usize) -> Result<Vec<f64>, PolydataError> {
-        let name = || array.attribute("Name").unwrap_or("an array").to_owned();
+        let name = || shown(array.attribute("Name").unwrap_or("an array"));
         let text = array.text().unwrap_or_default();
         let scalar = array.attribute("type").unwrap_or_default();
+        self.budget.spend(expected)?;
         let numbers = match array.attribute("format").unwrap_or("ascii") {
-            "ascii" => text
-                .split_whitespace()
-                .map(|word| {
-                    word.parse().map_err(|_| PolydataError::Word {
-                        what: "a number",
-                        found: word.chars().take(40).collect(),
-                    })
-                })
-                .collect::<Result<Vec<f64>, _>>()?,
+            "ascii" => {
+                let words = || text.split_whitespace();
+                let found = words().count();
+                if found != expected {
+                    return Err(PolydataError::Count { what: name(), found, expected });
+                }
+                let number = |word: &str| {
+                    word.parse().map_err(|_| PolydataError::Word { what: "a number", found: shown(word) })
+                };
+                words().map(number).collect::<Result<Vec<f64>, _>>()?
+            }
             format => {
                 let number_bytes = encoded::scalar_bytes(scalar).ok_or_else(|| PolydataError::Unknown {
                     what: "numbers of this type",
-                    found: scalar.to_owned(),
+                    found: shown(scalar),
                 })?;
                 let damaged = |cause| PolydataError::Bytes { array: name(), cause };
-                let n_left = self.n_left.get().checked_sub(expected);
-                self.n_left
-                    .set(n_left.ok_or_else(|| damaged("with it the file holds more than 1 GiB of numbers"))?);
                 if expected == 0 {
                     return Ok(Vec::new());
                 }
                 let expected_bytes = expected.saturating_mul(number_bytes);
                 let packed = match format {
-                    "binary" => encoded::from_base64(text.as_bytes()),
+                    "binary" => encoded::from_base64(text.as_bytes()).map(Cow::Owned),
                     "appended" => self.appended_at(array.attribute("offset")),
                     _ => Err("its format is unknown"),
                 };
@@ -252,13 +292,20 @@ impl File<'_> {
     }
 
     /// The appended bytes of an array, to where the next one begins.
-    fn appended_at(&self, offset: Option<&str>) -> Result<Vec<u8>, &'static str> {
+    fn appended_at(&self, offset: Option<&str>) -> Result<Cow<'_, [u8]>, &'static str> {
         let offset: usize = offset.and_then(|text| text.parse().ok()).ok_or("its offset is no number")?;
         let appended = self.appended.ok_or("there is no appended data")?;
-        let next = self.offsets.iter().copied().find(|&next| next > offset).unwrap_or(appended.len());
+        let after = self.offsets.partition_point(|&known| known <= offset);
+        let next = self.offsets.get(after).copied().unwrap_or(appended.len());
         let bytes =
             appended.get(offset..next.min(appended.len())).ok_or("its offset lies behind the data")?;
-        if self.is_appended_raw { Ok(bytes.to_vec()) } else { encoded::from_base64(bytes) }
+        let n_to_see = self.n_to_see.get().checked_sub(bytes.len());
+        self.n_to_see.set(n_to_see.ok_or("other arrays name the same bytes, too often")?);
+        if self.is_appended_raw {
+            Ok(Cow::Borrowed(bytes))
+        } else {
+            encoded::from_base64(bytes).map(Cow::Owned)
+        }
     }
 }
 
@@ -279,12 +326,38 @@ mod tests {
             is_appended_raw: false,
             offsets: Vec::new(),
             n_bytes: text.len(),
-            n_left: Cell::new(20),
+            budget: &Budget::of(20 * super::super::BYTES_OF_NUMBER, 0),
+            n_to_see: Cell::new(0),
         };
         let read = || file.numbers(document.root_element(), 8);
         assert_eq!(read().expect("8 of 20").len(), 8);
         assert_eq!(read().expect("16 of 20").len(), 8);
-        let error = read().expect_err("24 of 20").to_string();
-        assert!(error.contains("1 GiB"), "{error}");
+        assert!(matches!(read(), Err(PolydataError::TooLarge { limit: 640 })));
+    }
+
+    /// Thousands of pieces that each name all appended bytes: each would unpack them again.
+    #[test]
+    fn shared_bytes_are_not_read_for_ever() {
+        let piece = "<Piece NumberOfPoints=\"1\"><Points><DataArray type=\"Float32\" format=\"appended\" \
+                     offset=\"0\"/></Points></Piece>";
+        let text = format!(
+            "<VTKFile type=\"PolyData\"><PolyData>{}</PolyData><AppendedData encoding=\"base64\">_DAAAAAAAAAAAAAAAAAAA\
+             AA=={}</AppendedData></VTKFile>",
+            piece.repeat(2000),
+            "A".repeat(200_000)
+        );
+        let error =
+            parse(text.as_bytes(), &Budget::of(1 << 30, text.len())).expect_err("refused").to_string();
+        assert!(error.contains("too often"), "{error}");
+    }
+
+    /// The XML parser takes time with the square of an element's attributes.
+    #[test]
+    fn thousands_of_attributes_are_refused() {
+        let attributes: String = (0..50_000).map(|i| format!(" a{i}=\"\"")).collect();
+        let text = format!("<VTKFile type=\"PolyData\"{attributes}/>");
+        let error =
+            parse(text.as_bytes(), &Budget::of(1 << 30, text.len())).expect_err("refused").to_string();
+        assert!(error.contains("attributes"), "{error}");
     }
 }

@@ -85,8 +85,12 @@ pub enum SwcError {
     },
     /// A node among its own ancestors.
     #[error(
-        "line {line}: node {id} names parent {parent} (line {parent_line}), which descends from node {id}: \
-         a cycle of {n_nodes} nodes"
+        "line {line}: node {id} names {}",
+        if *n_nodes == 1 {
+            "itself as its parent".to_owned()
+        } else {
+            format!("parent {parent} (line {parent_line}), which descends from node {id}: a cycle of {n_nodes} nodes")
+        }
     )]
     Cycle {
         /// The line of the node.
@@ -109,7 +113,7 @@ pub enum SwcError {
         radius_mm: f64,
     },
     /// A file that should be ours has another header.
-    #[error("the header says {key} `{found}`, expected `{expected}`")]
+    #[error("the header says {key} `{found:.60}`, expected `{expected}`")]
     Header {
         /// The header key.
         key: &'static str,

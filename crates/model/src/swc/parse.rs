@@ -24,11 +24,21 @@ use super::{SwcError, SwcScale, Traced, TracedNode};
 use crate::{MAX_MM, Report};
 
 const N_COLUMNS: usize = 7;
+/// What a node takes while a file is read, at most: the node and its parent's id in lists that grow by doubling, its
+/// place by id, its mark.
+const BYTES_OF_NODE: u64 = 256;
 const COLUMN_NAMES: [&str; N_COLUMNS] = ["id", "type", "x", "y", "z", "radius", "parent"];
 /// Whole numbers written as floats are exact up to here.
 const MAX_EXACT: f64 = 9_007_199_254_740_992.0;
 /// How much of a faulty line an error shows.
 const N_SHOWN: usize = 60;
+
+/// The memory that reading a text takes at most, in bytes, its own included.
+#[must_use]
+pub fn memory_bytes(text: &[u8]) -> u64 {
+    let n_ends = text.iter().filter(|&&byte| byte == b'\n' || byte == b'\r').count();
+    text.len() as u64 + (n_ends as u64 + 1) * BYTES_OF_NODE
+}
 
 /// Reads the bytes of an SWC file. The rules stand in the header of this file.
 ///

@@ -75,6 +75,9 @@ impl Default for Config {
 /// The name in every result of a run that nobody has named.
 pub(crate) const UNNAMED: &str = "run";
 
+/// No config is as large: the longest resolved ones have some kilobytes.
+const MAX_CONFIG_BYTES: u64 = 4 << 20;
+
 /// A config and the folder that its relative paths start from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
@@ -93,7 +96,12 @@ impl Loaded {
         if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
             return Ok(Self { config: Config::for_input(path, overrides)?, base_dir: PathBuf::new() });
         }
-        let bytes = std::fs::read(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
+        let read = |source| Error::Read { path: path.to_owned(), source };
+        let needed = std::fs::metadata(path).map_err(read)?.len();
+        if needed > MAX_CONFIG_BYTES {
+            return Err(Error::TooLarge { path: path.to_owned(), needed, limit: MAX_CONFIG_BYTES });
+        }
+        let bytes = std::fs::read(path).map_err(read)?;
         let text = String::from_utf8(bytes).map_err(|_| ConfigError::no_text(path))?;
         let base_dir = path.parent().unwrap_or(Path::new("")).to_owned();
         Ok(Self { config: Config::parse(&text, path, overrides)?, base_dir })

@@ -12,6 +12,10 @@ use super::{Config, ConfigError, Override};
 
 /// How far a key may be from a legal one to be taken for it.
 const MAX_EDIT_DISTANCE: usize = 3;
+/// The longest line that is shown with its place marked; a longer one would bury the message.
+const MAX_SHOWN_LINE: usize = 300;
+/// How much of a message is shown: it quotes the text.
+const MAX_TITLE: usize = 300;
 
 /// The text of a config and where it stands.
 pub(super) struct SourceText<'a> {
@@ -67,15 +71,30 @@ impl SourceText<'_> {
 
     fn at(&self, span: Option<Range<usize>>, title: &str, hint: String) -> Box<ConfigError> {
         let path = self.path.display().to_string();
+        let title: String = title.chars().take(MAX_TITLE).collect();
         let Some(span) = span.filter(|span| span.end <= self.text.len()) else {
             return Box::new(ConfigError { rendered: format!("{path}: {title}"), hint });
         };
         let line = self.text[..span.start].matches('\n').count() + 1;
+        if span.len() > MAX_SHOWN_LINE || self.longest_line_at(&span) > MAX_SHOWN_LINE {
+            return Box::new(ConfigError { rendered: format!("{path}:{line}: {title}"), hint });
+        }
         let snippet =
             Snippet::source(self.text).path(path.as_str()).annotation(AnnotationKind::Primary.span(span));
-        let picture = Renderer::plain().render(&[Level::ERROR.primary_title(title).element(snippet)]);
+        let picture =
+            Renderer::plain().render(&[Level::ERROR.primary_title(title.as_str()).element(snippet)]);
         let picture = picture.split_once('\n').map_or("", |(_, rest)| rest);
         Box::new(ConfigError { rendered: format!("{path}:{line}: {title}\n{picture}"), hint })
+    }
+
+    /// The bytes of the longest line from that before a place to that after it.
+    fn longest_line_at(&self, span: &Range<usize>) -> usize {
+        let (before, after) = (&self.text[..span.start], &self.text[span.end..]);
+        let at = before.lines().next_back().map_or(0, str::len)
+            + span.len()
+            + after.lines().next().map_or(0, str::len);
+        let rest = before.lines().rev().skip(1).take(1).chain(after.lines().skip(1).take(1));
+        rest.map(str::len).max().unwrap_or(0).max(at)
     }
 
     /// Where a dotted key stands; where the innermost table on the way stands if the key is not there.

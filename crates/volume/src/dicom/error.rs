@@ -58,7 +58,8 @@ pub enum Obstacle {
     FloatPixels,
     /// A number of bits that is not read.
     #[error(
-        "the pixels have {stored} bits up to bit {high_bit} of {allocated}; espalier reads up to 16 of 8 or 16"
+        "the pixels have values of BitsStored {stored} up to HighBit {high_bit} in cells of BitsAllocated \
+         {allocated}; espalier reads cells of 8 or 16 bits"
     )]
     Bits {
         /// The bits of a cell.
@@ -216,6 +217,9 @@ pub enum DicomError {
         /// How many are DICOM.
         n_objects: usize,
     },
+    /// A file without an image.
+    #[error("this is DICOM without an image: a report, a plan, or a directory of files")]
+    NoImage,
     /// A folder of more files than a study has.
     #[error("there are more than {limit} files in the folder")]
     TooManyFiles {
@@ -271,7 +275,7 @@ pub enum DicomError {
 impl Diagnose for DicomError {
     fn code(&self) -> &'static str {
         match self {
-            Self::NoImages { .. } => "E-DICOM-NONE",
+            Self::NoImages { .. } | Self::NoImage => "E-DICOM-NONE",
             Self::TooManyFiles { .. } => "E-DICOM-FILES",
             Self::Ambiguous { .. } | Self::NoSuchSeries { .. } => "E-DICOM-SERIES",
             Self::Unfit { obstacle, .. } => obstacle.code(),
@@ -292,7 +296,9 @@ impl Diagnose for DicomError {
 
     fn hint(&self) -> String {
         match self {
-            Self::NoImages { .. } => "give the folder with the series, or one file of it".to_owned(),
+            Self::NoImages { .. } | Self::NoImage => {
+                "give the folder with the series, or one file of it".to_owned()
+            }
             Self::TooManyFiles { .. } => "give the folder of the one series".to_owned(),
             Self::Ambiguous { series } | Self::NoSuchSeries { series, .. } => choices(series),
             Self::Unfit { obstacle, .. } => obstacle.hint().to_owned(),

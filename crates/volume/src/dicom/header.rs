@@ -3,7 +3,8 @@
 //! **Input** a path. **Output** [`Object`].
 //! **Steps** 1. the first bytes of the file, and more of them as long as the pixels are not reached; 2. its elements;
 //! 3. each field that a slice needs, checked.
-//! **Guarantees** at most the limit is read into memory, by all threads together but for small files; what is kept is geometry and how intensities are stored,
+//! **Guarantees** no more than [`MAX_HEADER_BYTES`] of a file are held, and by all threads together but for small files;
+//! a deflated data set is inflated no further than its pixels. What is kept is geometry and how intensities are stored,
 //! and the identifiers by which files are told to belong together, which are only ever compared.
 
 use std::fs::File;
@@ -19,9 +20,14 @@ use super::error::Obstacle;
 use super::syntax::Syntax;
 
 /// The first bytes that are read of a file; most headers are shorter.
-const FIRST_BYTES: u64 = 64 << 10;
+pub(super) const FIRST_BYTES: u64 = 64 << 10;
 /// By how much more is read each time.
 const GROWTH: u64 = 8;
+/// Pixels that begin later are those of no scanner; the longest headers, with icons and private tables, have a tenth.
+const MAX_HEADER_BYTES: u64 = 16 << 20;
+/// No byte of a deflated data set stands for more than this many: RFC 1951 has matches of at most 258 bytes in at least
+/// 2 bits.
+const MAX_DEFLATE_RATIO: u64 = 1032;
 /// Orthonormal axes may be off by this: directions are written with few decimals.
 const MAX_AXIS_ERROR: f64 = 1e-3;
 
@@ -103,29 +109,9 @@ pub(super) enum Found {
 /// Looks at one file. What takes more than a few bytes waits at the gate for its turn, so that files looked at side by
 /// side do not take the limit each.
 pub(super) fn inspect(path: &Path, max_bytes: u64, gate: &Mutex<()>) -> std::io::Result<Found> {
-    let mut turn = None;
-    let mut file = File::open(path)?;
-    let n_file = file.metadata()?.len();
-    let mut bytes = Vec::new();
-    loop {
-        let n_wanted = (bytes.len() as u64 * GROWTH).max(FIRST_BYTES).min(n_file);
-        if !bytes.is_empty() {
-            turn.get_or_insert_with(|| gate.lock().unwrap_or_else(PoisonError::into_inner));
-        }
-        (&mut file).take(n_wanted - bytes.len() as u64).read_to_end(&mut bytes)?;
-        if !tag::looks_like_dicom(&bytes) {
-            return Ok(Found::Other);
-        }
-        let is_whole = bytes.len() as u64 >= n_file || (bytes.len() as u64) < n_wanted;
-        if is_whole && read_meta(&bytes).syntax.is_some_and(|uid| Syntax::of_uid(&uid) == Syntax::Deflated) {
-            turn.get_or_insert_with(|| gate.lock().unwrap_or_else(PoisonError::into_inner));
-        }
-        let data_set = read_data_set(&bytes, max_bytes, is_whole);
-        let is_short = data_set.elements.fault == Some(Fault::Short);
-        if is_whole || !is_short || n_wanted.saturating_mul(GROWTH) > max_bytes {
-            return Ok(found(path, &data_set, n_file));
-        }
-    }
+    let n_file = std::fs::metadata(path)?.len();
+    let data_set = DataSet::open(path, max_bytes, gate)?;
+    Ok(data_set.map_or(Found::Other, |data_set| found(path, &data_set, n_file)))
 }
 
 /// Whether a file is DICOM, by its first bytes.
@@ -143,34 +129,112 @@ struct DataSet {
     n_inflated: Option<u64>,
 }
 
-fn read_data_set(bytes: &[u8], max_bytes: u64, is_whole: bool) -> DataSet {
-    let meta = read_meta(bytes);
-    let syntax = meta.syntax.as_deref().map_or(Syntax::Native { is_big_endian: false }, Syntax::of_uid);
-    if syntax == Syntax::Deflated {
-        // Half a stream says nothing of the rest, so the file is read whole first.
-        let inflated = if is_whole { inflate(&bytes[meta.end..], max_bytes) } else { Vec::new() };
-        let mut elements = read_elements(&inflated, 0, false);
-        if !is_whole {
-            elements.fault = Some(Fault::Short);
+impl DataSet {
+    /// The data set of a file; none if that is no DICOM.
+    fn open(path: &Path, max_bytes: u64, gate: &Mutex<()>) -> std::io::Result<Option<Self>> {
+        let mut file = File::open(path)?;
+        let mut start = Vec::new();
+        (&mut file).take(FIRST_BYTES).read_to_end(&mut start)?;
+        if !tag::looks_like_dicom(&start) {
+            return Ok(None);
         }
-        return DataSet { elements, syntax, n_inflated: Some(inflated.len() as u64) };
+        let meta = read_meta(&start);
+        let syntax = meta.syntax.as_deref().map_or(Syntax::Native { is_big_endian: false }, Syntax::of_uid);
+        let is_big_endian = syntax == Syntax::Native { is_big_endian: true };
+        let most = MAX_HEADER_BYTES.min(max_bytes);
+        if syntax == Syntax::Deflated {
+            let _turn = gate.lock().unwrap_or_else(PoisonError::into_inner);
+            let packed = Forgiving(DeflateDecoder::new(start[meta.end..].chain(file)));
+            let mut inflated = Growing { bytes: Vec::new(), rest: packed, is_whole: false, most, gate: None };
+            inflated.read_on(FIRST_BYTES)?;
+            let elements = inflated.elements(0, false)?;
+            let n_file = std::fs::metadata(path)?.len();
+            let n_inflated = Some(inflated.n_there(&elements, (n_file, max_bytes))?);
+            return Ok(Some(Self { elements, syntax, n_inflated }));
+        }
+        let is_whole = (start.len() as u64) < FIRST_BYTES;
+        let mut stored = Growing { bytes: start, rest: file, is_whole, most, gate: Some(gate) };
+        let elements = stored.elements(meta.end, is_big_endian)?;
+        // Without a meta group the elements tell the byte order.
+        let syntax = match syntax {
+            Syntax::Native { .. } => Syntax::Native { is_big_endian: elements.encoding.is_big_endian },
+            other => other,
+        };
+        Ok(Some(Self { elements, syntax, n_inflated: None }))
     }
-    let is_big_endian = syntax == Syntax::Native { is_big_endian: true };
-    let elements = read_elements(bytes, meta.end, is_big_endian);
-    // Without a meta group the elements tell the byte order.
-    let syntax = match syntax {
-        Syntax::Native { .. } => Syntax::Native { is_big_endian: elements.encoding.is_big_endian },
-        other => other,
-    };
-    DataSet { elements, syntax, n_inflated: None }
 }
 
-/// A deflated data set, as far as it goes and the limit allows.
-fn inflate(deflated: &[u8], max_bytes: u64) -> Vec<u8> {
-    let mut inflated = Vec::new();
-    // What came out before damage stands; the walk over it says where it ends.
-    let _ = DeflateDecoder::new(deflated).take(max_bytes).read_to_end(&mut inflated);
-    inflated
+/// The first bytes of something, of which more are read as they are needed.
+struct Growing<'a, R> {
+    bytes: Vec<u8>,
+    rest: R,
+    /// Whether there are no more.
+    is_whole: bool,
+    /// How many may be held.
+    most: u64,
+    /// Where to wait for more; none where the wait is over.
+    gate: Option<&'a Mutex<()>>,
+}
+
+impl<R: Read> Growing<'_, R> {
+    /// The elements from `start` on.
+    fn elements(&mut self, start: usize, is_big_endian: bool) -> std::io::Result<Elements> {
+        let mut turn = None;
+        loop {
+            let mut elements = read_elements(&self.bytes, start, is_big_endian);
+            // The bytes at hand may end where an element does.
+            let is_open = matches!(elements.fault, None | Some(Fault::Short))
+                && elements.pixels.is_none()
+                && !elements.has_float_pixels;
+            if self.is_whole || !is_open {
+                return Ok(elements);
+            }
+            let n_held = self.bytes.len() as u64;
+            if n_held >= self.most {
+                elements.fault = Some(Fault::Malformed("its header is longer than any"));
+                return Ok(elements);
+            }
+            if turn.is_none() {
+                turn = self.gate.map(|gate| gate.lock().unwrap_or_else(PoisonError::into_inner));
+            }
+            self.read_on(n_held * (GROWTH - 1))?;
+        }
+    }
+
+    /// Reads so many more, as far as they may be held.
+    fn read_on(&mut self, n_bytes: u64) -> std::io::Result<()> {
+        let n_wanted = n_bytes.min(self.most.saturating_sub(self.bytes.len() as u64));
+        self.bytes.reserve_exact(n_wanted as usize);
+        let n_read = (&mut self.rest).take(n_wanted).read_to_end(&mut self.bytes)?;
+        self.is_whole = (n_read as u64) < n_wanted;
+        Ok(())
+    }
+
+    /// How many bytes there are in all, as far as the pixels need them. Where they cannot be there, or are more than may
+    /// be held, which is said later, nothing more is inflated.
+    fn n_there(&mut self, elements: &Elements, (n_file, max_bytes): (u64, u64)) -> std::io::Result<u64> {
+        let n_held = self.bytes.len() as u64;
+        let extent = |field| u64::from(elements.short(field).unwrap_or(0));
+        let n_pixels = extent(tag::ROWS) * extent(tag::COLUMNS);
+        let n_bytes = n_pixels * u64::from(elements.short(tag::BITS_ALLOCATED).unwrap_or(0)).div_ceil(8);
+        let needed = elements.pixels.map_or(0, |place| place.offset as u64).saturating_add(n_bytes);
+        match needed {
+            _ if needed <= n_held || needed / MAX_DEFLATE_RATIO > n_file => Ok(n_held),
+            _ if needed > max_bytes => Ok(needed),
+            _ => {
+                Ok(n_held + std::io::copy(&mut (&mut self.rest).take(needed - n_held), &mut std::io::sink())?)
+            }
+        }
+    }
+}
+
+/// A stream whose damage is its end: what came before stands, and the walk over it says where it ends.
+struct Forgiving<R>(R);
+
+impl<R: Read> Read for Forgiving<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        Ok(self.0.read(buffer).unwrap_or(0))
+    }
 }
 
 fn found(path: &Path, data_set: &DataSet, n_file: u64) -> Found {
@@ -326,6 +390,7 @@ fn padding(elements: &Elements, is_signed: bool) -> Option<(i32, i32)> {
 /// How the pixels of a file lie in it, whether or not it is a slice.
 #[cfg(test)]
 pub(super) fn stored_in(path: &Path) -> Result<StoredPixels, Obstacle> {
-    let bytes = std::fs::read(path).unwrap_or_default();
-    stored_pixels(&read_data_set(&bytes, 1 << 30, true), bytes.len() as u64)
+    let n_file = std::fs::metadata(path).map_or(0, |metadata| metadata.len());
+    let data_set = DataSet::open(path, 1 << 30, &Mutex::new(())).ok().flatten();
+    stored_pixels(&data_set.ok_or(Obstacle::Damaged { what: "it cannot be read" })?, n_file)
 }

@@ -13,12 +13,14 @@ use std::path::Path;
 use espalier_model::bytes::from_lowest;
 use flate2::read::DeflateDecoder;
 
-use super::header::StoredPixels;
+use super::header::{FIRST_BYTES, StoredPixels};
 use super::syntax::Syntax;
 use super::{codec, element, rle};
 
-/// More than any group before the data set has.
-const MAX_META_BYTES: u64 = 1 << 20;
+/// A compressed image takes at most so many times its pixels' bytes, …
+const MAX_EXPANSION: u64 = 4;
+/// … and this much for what its format says of itself.
+const MAX_OVERHEAD_BYTES: u64 = 64 << 10;
 
 /// Reads and decodes one slice; the error says what is wrong with it.
 pub(super) fn decode(path: &Path, stored: &StoredPixels, max_bytes: u64) -> Result<Vec<i32>, String> {
@@ -80,7 +82,7 @@ fn native_bytes(path: &Path, stored: &StoredPixels) -> Result<Vec<u8>, String> {
 fn inflated_bytes(path: &Path, start: u64, n_bytes: usize) -> std::io::Result<Vec<u8>> {
     let mut file = BufReader::new(File::open(path)?);
     let mut meta = Vec::new();
-    (&mut file).take(MAX_META_BYTES).read_to_end(&mut meta)?;
+    (&mut file).take(FIRST_BYTES).read_to_end(&mut meta)?;
     let packed = meta.get(element::read_meta(&meta).end..).unwrap_or_default();
     let mut data_set = DeflateDecoder::new(packed.chain(file));
     std::io::copy(&mut (&mut data_set).take(start), &mut std::io::sink())?;
@@ -96,6 +98,7 @@ fn inflated_bytes(path: &Path, start: u64, n_bytes: usize) -> std::io::Result<Ve
 fn fragments(path: &Path, stored: &StoredPixels, max_bytes: u64) -> Result<Vec<u8>, String> {
     let mut file = BufReader::new(File::open(path).map_err(|error| error.to_string())?);
     file.seek(SeekFrom::Start(stored.place.offset as u64)).map_err(|error| error.to_string())?;
+    let most = max_bytes.min((stored.n_bytes() as u64).saturating_mul(MAX_EXPANSION) + MAX_OVERHEAD_BYTES);
     let mut together = Vec::new();
     for index in 0_u64.. {
         let mut start = [0_u8; 8];
@@ -105,14 +108,15 @@ fn fragments(path: &Path, stored: &StoredPixels, max_bytes: u64) -> Result<Vec<u
         }
         let [.., a, b, c, d] = start;
         let length = u64::from(u32::from_le_bytes([a, b, c, d]));
-        if together.len() as u64 + length > max_bytes {
-            return Err("its fragments declare more bytes than allowed".to_owned());
-        }
-        let n_before = together.len();
-        (&mut file).take(length).read_to_end(&mut together).map_err(|error| error.to_string())?;
+        let mut item = (&mut file).take(length);
         if index == 0 {
-            together.clear();
-        } else if ((together.len() - n_before) as u64) < length {
+            std::io::copy(&mut item, &mut std::io::sink()).map_err(|error| error.to_string())?;
+            continue;
+        }
+        if together.len() as u64 + length > most {
+            return Err("its fragments are longer than its pixels could be".to_owned());
+        }
+        if (item.read_to_end(&mut together).map_err(|error| error.to_string())? as u64) < length {
             return Err("its last fragment is cut short".to_owned());
         }
     }

@@ -254,8 +254,7 @@ impl Contents {
             return Err(unfit(object, None));
         }
         let holds = |group: &Group| group.objects.iter().any(|object| object.path == path);
-        let none = DicomError::NoImages { n_files: 1, n_objects: 1 };
-        self.groups.iter().position(holds).ok_or(none)
+        self.groups.iter().position(holds).ok_or(DicomError::NoImage)
     }
 
     /// The group asked for, or the only one that can be a volume.
