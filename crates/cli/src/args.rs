@@ -29,6 +29,8 @@ Examples:
   espalier sweep my.toml --over embed.w_length=0.5,1,2  losses against a setting: table and plot
   espalier group out -o group                           one page over all runs in a folder
   espalier phantom airway -o phantoms/airway            test data with its truth
+  espalier config init vessel -o my.toml                a config to start with
+  espalier config explain tree.root                     what a key means, its default and its range
   espalier explain E-VOLUME-NO-SPACE                    what an error code means, and the way out
 
 Exit codes:
@@ -166,6 +168,11 @@ pub(crate) enum Command {
     Profile(ProfileArguments),
     /// From the scan to the map and back, of a run:  espalier locate RUN X,Y,Z, or espalier locate RUN U,V
     Locate(LocateArguments),
+    /// What this program is: versions of its stages, target, formats, limits, threads and memory here
+    Info(InfoArguments),
+    /// Configs: every key and its meaning, the JSON Schema, one to start with
+    #[command(subcommand)]
+    Config(ConfigCommand),
     /// What an error or warning code means and what to do:  espalier explain E-VOLUME-NO-SPACE
     Explain(ExplainArguments),
     /// What an input is, what is to be said of it, which command suits it, and what that would cost:  espalier doctor FILE
@@ -476,6 +483,46 @@ pub(crate) struct LocateArguments {
     /// Print the points as JSON
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// `espalier info`.
+#[derive(Debug, Args)]
+pub(crate) struct InfoArguments {
+    /// Print as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `espalier config`.
+#[derive(Debug, Subcommand)]
+pub(crate) enum ConfigCommand {
+    /// Print the JSON Schema of a config, for editors that complete keys and mark mistakes
+    Schema,
+    /// Type, unit, range, default and meaning of a key or of all keys of a section:  espalier config explain tree.root
+    Explain(KeyArguments),
+    /// Print a config to start with, commented:  espalier config init airway -o my.toml
+    Init(InitArguments),
+}
+
+/// `espalier config explain`.
+#[derive(Debug, Args)]
+pub(crate) struct KeyArguments {
+    /// A key such as tree.root, or a section such as embed.pso [default: all keys]
+    pub(crate) key: Option<String>,
+    /// Print as JSON: key, kind, unit, default, range, choices, text
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `espalier config init`.
+#[derive(Debug, Args)]
+pub(crate) struct InitArguments {
+    /// What it is for; paper is the method as published
+    #[arg(default_value = "airway", value_parser = ["airway", "vessel", "neuron", "paper"])]
+    pub(crate) kind: String,
+    /// Write to this file, which must not be there yet [default: print]
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
 }
 
 /// `espalier explain`.

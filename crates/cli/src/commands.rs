@@ -21,9 +21,8 @@ use crate::args::{
     LocateArguments, PhantomArguments, PlaceArguments, ProfileArguments, Rerun, RunArguments, StageArguments,
     SweepArguments, VerifyArguments,
 };
-use crate::checks;
-use crate::explain;
 use crate::progress::{self, Progress};
+use crate::{checks, config, explain, info};
 
 /// Memory assumed where the machine does not tell its own.
 const FALLBACK_MEMORY_BYTES: u64 = 4 << 30;
@@ -50,6 +49,8 @@ pub(crate) fn execute(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Profile(profile) => return print_profile(arguments, profile),
         Command::Doctor(doctor) => return examine(arguments, doctor),
         Command::Locate(locate) => return print_located(arguments, locate),
+        Command::Info(arguments_of_info) => return info::print(arguments, arguments_of_info),
+        Command::Config(command) => return config::execute(command),
         Command::Explain(explain) => return explain::print(explain),
         Command::Completions { shell } => {
             progress::result(completions(*shell).trim_end());
@@ -493,7 +494,7 @@ fn cache(arguments: &Arguments) -> Option<Cache> {
 }
 
 /// Half of the machine's memory.
-fn half_of_memory() -> u64 {
+pub(crate) fn half_of_memory() -> u64 {
     let total = || -> Option<u64> {
         let text = std::fs::read_to_string("/proc/meminfo").ok()?;
         let kilobytes = text.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;

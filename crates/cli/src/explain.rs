@@ -38,7 +38,7 @@ fn page(entry: &Entry) -> String {
 }
 
 /// Words in lines of [`WIDTH`], under a heading at their left.
-fn paragraph(heading: &str, text: &str) -> String {
+pub(crate) fn paragraph(heading: &str, text: &str) -> String {
     let mut lines = vec![heading.to_owned()];
     for word in text.split_whitespace() {
         let line = lines.last().map_or(0, |line| line.chars().count());

@@ -7,7 +7,9 @@ mod args;
 mod cancel;
 mod checks;
 mod commands;
+mod config;
 mod explain;
+mod info;
 mod progress;
 
 use std::process::ExitCode;

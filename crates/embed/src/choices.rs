@@ -2,14 +2,16 @@
 //!
 //! Written in the config as words in kebab-case; the price of a crossing is the word `auto` or a number.
 
+use std::borrow::Cow;
 use std::fmt;
 
 use espalier_model::{TargetKind, WidthMode};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// Where target angles come from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum TargetMode {
     /// The exact angle in three dimensions; the local plane only tells the side.
@@ -29,7 +31,7 @@ impl From<TargetMode> for TargetKind {
 }
 
 /// Whether the space behind the root is kept free while sides are searched.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum KeepOut {
     /// Where the tree has a trunk: one branch leaves the root, and it is thicker than any other.
@@ -42,7 +44,7 @@ pub enum KeepOut {
 }
 
 /// What is done about tubes that overlap.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum WidthsMode {
     /// They are counted.
@@ -76,7 +78,7 @@ impl From<WidthsMode> for WidthMode {
 }
 
 /// How the whole is turned in the end.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum PoseMode {
     /// As in the view, unless the caller knows that the tree was not made from a scan: then the root on top.
@@ -89,7 +91,7 @@ pub enum PoseMode {
 }
 
 /// A way to lay a tree flat.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// The best global view as it is, crossings and all.
@@ -130,7 +132,7 @@ impl Method {
 
 /// The view towards which `marino` bends the radial layout. The anatomical ones are for RAS+, as radiologists see them:
 /// the patient's right, or front, is on the viewer's left.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum MarinoView {
     /// The best global view.
@@ -164,7 +166,7 @@ impl MarinoView {
 }
 
 /// What a swarm does after the solver.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SwarmUse {
     /// Nothing.
@@ -175,7 +177,7 @@ pub enum SwarmUse {
 }
 
 /// Which ratios a particle may choose on its own.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Freedom {
     /// As printed: one length and one angle ratio per segment.
@@ -200,7 +202,7 @@ impl Freedom {
 }
 
 /// Where the particles of a swarm start.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Start {
     /// Uniform over the ranges, with P_0 = 0 and P_1 = the radial layout.
@@ -211,7 +213,7 @@ pub enum Start {
 }
 
 /// How a particle is drawn to the best places.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Pull {
     /// Equation 5 as printed: on all ratios alike.
@@ -271,5 +273,19 @@ impl<'de> Deserialize<'de> for CrossingWeight {
             }
         }
         deserializer.deserialize_any(AutoOrNumber)
+    }
+}
+
+/// What the reader below takes, for the schema of the config.
+impl JsonSchema for CrossingWeight {
+    fn schema_name() -> Cow<'static, str> {
+        "CrossingWeight".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "anyOf": [
+            { "type": "string", "const": "auto", "description": "1.5 times the largest energy of any layout without crossings." },
+            { "type": "number", "exclusiveMinimum": 0 },
+        ] })
     }
 }

@@ -1,6 +1,7 @@
 //! What to make: the kind of a phantom and its parameters.
 
 use espalier_model::diagnose::ParamError;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The largest number of voxels a phantom may have: 512³. A CT of that size needs about 1 GB while it is made.
@@ -10,7 +11,7 @@ pub const MAX_VOXELS: usize = 512 * 512 * 512;
 pub const MAX_NODES: usize = 1_000_000;
 
 /// What a phantom shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// A straight tube.
@@ -67,7 +68,7 @@ impl Kind {
 /// How a phantom is made. Which keys a kind heeds stands with each key; the others do nothing for it.
 ///
 /// The closed forms lie about the world's origin, their axis along `direction`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
     /// Distance between voxel centres along x, y, z, in mm, 0.0001 to 100. Default 1, 1, 1: an airway CT of

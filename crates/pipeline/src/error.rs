@@ -278,6 +278,14 @@ pub enum Error {
         /// Codes like it.
         nearest: Vec<String>,
     },
+    /// A key that no config has.
+    #[error("there is no key {key}")]
+    UnknownKey {
+        /// What was asked for.
+        key: String,
+        /// Keys like it.
+        nearest: Vec<String>,
+    },
     /// The threads cannot be started.
     #[error("cannot start {threads} threads: {message}")]
     Threads {
@@ -358,6 +366,7 @@ impl Diagnose for Error {
             Self::Locked { .. } => "E-RUN-LOCKED",
             Self::Threads { .. } => "E-RUN-THREADS",
             Self::UnknownCode { .. } => "E-EXPLAIN-CODE",
+            Self::UnknownKey { .. } => "E-EXPLAIN-KEY",
         }
     }
 
@@ -382,6 +391,7 @@ impl Diagnose for Error {
             | Self::SweepSize { .. }
             | Self::GroupSize { .. }
             | Self::UnknownCode { .. }
+            | Self::UnknownKey { .. }
             | Self::Threads { .. } => Class::Usage,
             Self::NoRun { .. }
             | Self::NoGroup { .. }
@@ -420,6 +430,10 @@ impl Diagnose for Error {
             Self::NotSwept { .. } => "write --over KEY=V1,V2,…, such as --over embed.w_length=0.5,1,2,4".to_owned(),
             Self::SweepSize { .. } => "give fewer values, or sweep one key at a time".to_owned(),
             Self::Settled { .. } => "of a finished run only render.* can be changed; or compare its config".to_owned(),
+            Self::UnknownKey { nearest, .. } if nearest.is_empty() => {
+                "espalier config explain lists all keys".to_owned()
+            }
+            Self::UnknownKey { nearest, .. } => format!("did you mean {}?", nearest.join(" or ")),
             Self::UnknownCode { nearest, .. } if nearest.is_empty() => "espalier explain lists all codes".to_owned(),
             Self::UnknownCode { nearest, .. } => {
                 format!("did you mean {}? espalier explain lists all codes", nearest.join(" or "))

@@ -44,25 +44,11 @@ pub(crate) fn write(folder: &RunFolder, error: &Error) {
         version: VERSION,
         stage,
         code: error.code().to_owned(),
-        reason: reason(error.class()).to_owned(),
+        // The message itself may quote the input.
+        reason: error.class().meaning().to_owned(),
     };
     let json = serde_json::to_string_pretty(&failure).unwrap_or_default() + "\n";
     let _ = folder.write_aside(FILE, json.as_bytes());
-}
-
-/// What a class of errors has in common. The message itself may quote the input.
-fn reason(class: Class) -> &'static str {
-    match class {
-        Class::Internal => "a bug of espalier",
-        Class::Usage => "settings that cannot be",
-        Class::Input => "the input is malformed, or holds nothing to work on",
-        Class::Limit => "a stated limit would be exceeded",
-        Class::Topology => "the topology is refused by policy",
-        Class::Uncertified => "no certified layout, or an altered file",
-        Class::CannotCreate => "an output cannot be created",
-        Class::Io => "a file is missing or unreadable, or the disk fails",
-        Class::Locked => "another run holds the folder",
-    }
 }
 
 /// Forgets why an earlier run stopped.

@@ -20,6 +20,7 @@
 //! | the page of a run: what it is made from | `page` |
 //! | what the columns of the tables mean | `dictionary` |
 //! | what each error and warning code means | [`mod@explain`] |
+//! | what this program is, reads and writes | [`mod@info`] |
 //! | a point of the scan on the map, and back | [`mod@locate`] |
 //! | the calibre on the way to a place, as a table or a plot | [`profile()`], [`plot_profile`] |
 //! | a run folder held against itself | [`verify()`] |
@@ -43,6 +44,7 @@ pub mod explain;
 mod failure;
 mod folder;
 pub mod group;
+pub mod info;
 pub mod juxtapose;
 mod labels;
 pub mod locate;

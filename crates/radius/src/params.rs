@@ -1,10 +1,11 @@
 //! Parameters of the radius measurement.
 
 use espalier_model::diagnose::ParamError;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Parameters of the radius measurement: `[radius]` in the config.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
     /// Where the distance is read. Default `ridge`.
@@ -25,7 +26,7 @@ pub struct Params {
 }
 
 /// Where the distance to the background is read.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rule {
     /// On the axis: where the cross-section is round, its centroid and the radius of the circle of its area;

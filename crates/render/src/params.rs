@@ -1,12 +1,13 @@
 //! The parameters of the pictures.
 
 use espalier_model::diagnose::ParamError;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::reformation::params::VolumeParams;
 
 /// How the branches are drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Style {
     /// Lit round cones between the radii of the nodes (section 4.1 of [Hu2022]).
@@ -29,7 +30,7 @@ impl Style {
 }
 
 /// The background and the ink.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Theme {
     /// Dark ink on white, for screens and paper.
@@ -42,7 +43,7 @@ pub enum Theme {
 }
 
 /// What the colours mean.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ColorBy {
     /// The radius at each place against the mean radius of the tree.
@@ -68,7 +69,7 @@ pub enum ColorBy {
 }
 
 /// Where the organ in space is seen from, in the figure of it beside the map.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SpaceView {
     /// The global view, from which least of the tree is hidden or shortened.
@@ -83,7 +84,7 @@ pub enum SpaceView {
 }
 
 /// How the tree lies on its page.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fit {
     /// As the embedding has it: as seen in the patient, or with the root on top.
@@ -94,7 +95,7 @@ pub enum Fit {
 }
 
 /// The unit of the scale bar and of the radii.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Unit {
     /// The unit in which the number is easiest to read.
@@ -113,7 +114,7 @@ pub enum Unit {
 }
 
 /// The letters at the edges of the map and of the global view, and at branches that run otherwise.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Compass {
     /// Anatomical, unless the caller knows that the tree was not made from a scan: then axes.
@@ -146,7 +147,7 @@ pub struct LabelEntry {
 }
 
 /// The parameters of the pictures.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
     /// Width of the pictures in pixels, 240 to 16384; the height follows from the shape of the tree. Default

@@ -1,10 +1,11 @@
 //! Parameters of thinning.
 
 use espalier_model::diagnose::ParamError;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Parameters of thinning: `[skeleton]` in the config.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
     /// The thinning rule. Default `safe`: the published rule makes bars of even width vanish.
@@ -12,7 +13,7 @@ pub struct Params {
 }
 
 /// Which rule decides what is deleted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Thinning {
     /// Ours: nothing vanishes, components and Euler number stay, tubes keep their length.

@@ -1,12 +1,13 @@
 //! Settings of the tree stage.
 
 use espalier_model::diagnose::ParamError;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What to do with a skeleton in several pieces. Short gaps are mostly stretches that the segmentation lost, and a
 /// reader expects the vessel to go on; distant pieces are other vessels or noise, and an edge to them would be a vessel
 /// that is not there. But a tree of its own, such as the vessels of the other lung, belongs in the picture, edge or no.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Components {
     /// Keep the longest, join to it what lies within `bridge_mm`, and over any gap what is a tree of its own, drop the
@@ -22,7 +23,7 @@ pub enum Components {
 }
 
 /// What to do with loops.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Loops {
     /// Open each at its thinnest place; each cut is in the ledger.
@@ -33,7 +34,7 @@ pub enum Loops {
 }
 
 /// Where the tree is rooted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Root {
     /// At the tip of the largest calibre.
@@ -44,7 +45,7 @@ pub enum Root {
 }
 
 /// Where the free ends of the tree are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Tips {
     /// At the centre of the sphere that touches the end of the mask: drawn with its radius, as round cones are,
@@ -58,7 +59,7 @@ pub enum Tips {
 }
 
 /// How densely nodes stand on a branch.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Resample {
     /// `shape` for masks, `none` for traced trees, whose nodes are the annotator's.
@@ -73,7 +74,7 @@ pub enum Resample {
 }
 
 /// What to do with several roots of a traced structure.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Roots {
     /// Keep the tree of the greatest length, drop the others; each drop is in the ledger.
@@ -86,7 +87,7 @@ pub enum Roots {
 }
 
 /// What to do with nodes of a traced structure that have radius 0, which means "not measured".
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum MissingRadii {
     /// The mean of the nearest measured radii above and below; 0 where there is none at all.
@@ -97,7 +98,7 @@ pub enum MissingRadii {
 }
 
 /// Settings of the tree stage.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
     /// What to do with a skeleton in several pieces. Default `join`. It matters only if `volume.components` left several.

@@ -1,10 +1,11 @@
 //! Parameters of the views.
 
 use espalier_model::diagnose::ParamError;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How the loss of a view is measured.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Metric {
     /// The Kullback–Leibler distance between the shares of length in the view and in space: Eq. 1 of [Hu2022].
@@ -16,7 +17,7 @@ pub enum Metric {
 }
 
 /// How the best direction is searched.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Search {
     /// Directions on a Fibonacci spiral over the half sphere, the best refined by a pattern search.
@@ -27,7 +28,7 @@ pub enum Search {
 }
 
 /// Which of its two sides each local plane shows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mirror {
     /// The side that keeps the headings of the laid-out tree nearest to the global view's.
@@ -40,7 +41,7 @@ pub enum Mirror {
 }
 
 /// Parameters of the views.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
     /// The view metric. Default `"ukl"`: its planes shift less under noise (3.6° against 4.1° for 2 % of edge length

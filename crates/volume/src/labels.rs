@@ -10,9 +10,11 @@
 
 mod classes;
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, SeqAccess, Visitor};
 use serde::ser::SerializeSeq;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -254,6 +256,21 @@ impl<'de> Visitor<'de> for LabelsVisitor {
             labels.extend(more);
         }
         Ok(Labels(labels))
+    }
+}
+
+/// What the reader below takes, for the schema of the config.
+impl JsonSchema for Labels {
+    fn schema_name() -> Cow<'static, str> {
+        "Labels".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "anyOf": [
+            { "type": "string" },
+            { "type": "number" },
+            { "type": "array", "items": { "anyOf": [{ "type": "string" }, { "type": "number" }] } },
+        ] })
     }
 }
 

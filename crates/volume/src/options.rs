@@ -2,6 +2,7 @@
 
 use espalier_model::RAS_FROM_LPS;
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How a file is read.
@@ -42,7 +43,7 @@ impl Default for ReadOptions {
 
 /// The space of a file that does not name it: where its axes x, y and z point in the body. Without directions of
 /// their own the voxel axes are these, and voxel (0, 0, 0) is the origin.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum AssumedSpace {
     /// Right, anterior, superior: what the NIfTI-1 standard says ("method 1").

@@ -1,9 +1,11 @@
 //! What the caller may choose: how a volume becomes a mask.
 
+use std::borrow::Cow;
 use std::fmt;
 
 use espalier_model::diagnose::ParamError;
 use glam::DVec3;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -12,7 +14,7 @@ use crate::labels::Labels;
 use crate::spacing::Spacing;
 
 /// How a volume becomes a mask.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
     /// What a scan shows, where nothing else is said: `"airway"` grows from the trachea, which it finds by itself, up
@@ -92,7 +94,7 @@ impl Default for Params {
 }
 
 /// In which axis order a mask is handed on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Orientation {
     /// x to the right, y to anterior, z to superior, as near as the scan's axes allow; the origin rounded to a 128th of
@@ -104,7 +106,7 @@ pub enum Orientation {
 }
 
 /// What a scan shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Preset {
     /// Airways: air inside walls.
@@ -138,7 +140,7 @@ impl Preset {
 pub(crate) const VESSEL_FROM_HU: f64 = 150.0;
 
 /// How the organ's voxels are chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// By what the volume is; never a silent guess.
@@ -344,5 +346,22 @@ impl Params {
     #[must_use]
     pub fn band(&self) -> (f64, f64) {
         (self.lower.unwrap_or(f64::NEG_INFINITY), self.upper.unwrap_or(f64::INFINITY))
+    }
+}
+
+/// What the reader below takes, for the schema of the config.
+impl JsonSchema for Components {
+    fn schema_name() -> Cow<'static, str> {
+        "Components".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "anyOf": [
+            { "type": "string", "const": "auto", "description": "`largest` of a scan, `main` of a mask or label map." },
+            { "type": "string", "const": "largest", "description": "The one with the most voxels." },
+            { "type": "string", "const": "main", "description": "Those with at least a twentieth of its voxels." },
+            { "type": "string", "const": "all", "description": "All of them." },
+            { "type": "integer", "minimum": 1 },
+        ] })
     }
 }

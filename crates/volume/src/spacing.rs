@@ -1,8 +1,10 @@
 //! The spacing that a volume is wanted at, as it stands in a config.
 
+use std::borrow::Cow;
 use std::fmt;
 
 use glam::DVec3;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -92,5 +94,20 @@ impl<'de> Visitor<'de> for SpacingVisitor {
             Some(_) => Err(de::Error::invalid_length(4, &self)),
             None => Ok(Spacing::Each(each)),
         }
+    }
+}
+
+/// What the reader below takes, for the schema of the config.
+impl JsonSchema for Spacing {
+    fn schema_name() -> Cow<'static, str> {
+        "Spacing".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "anyOf": [
+            { "type": "string", "const": "isotropic", "description": "The smallest of the volume's own along every axis." },
+            { "type": "number" },
+            { "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3 },
+        ] })
     }
 }

@@ -2,12 +2,13 @@
 
 use espalier_model::diagnose::ParamError;
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::choices::MarinoView;
 
 /// The view towards which the radial layout is bent.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MarinoParams {
     /// The view. Default `auto`, the best global view; the published method has the user choose one.

@@ -9,6 +9,7 @@ mod widths;
 use std::borrow::Cow;
 
 use espalier_model::diagnose::ParamError;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use marino::MarinoParams;
@@ -20,7 +21,7 @@ pub use widths::WidthsParams;
 use crate::choices::{CrossingWeight, Method, PoseMode, SwarmUse, TargetMode};
 
 /// How a tree is laid flat.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
     /// Where target angles come from. Default `intrinsic`: the exact angles can always be drawn, so nothing is

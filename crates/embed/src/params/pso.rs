@@ -1,6 +1,7 @@
 //! The parameters of the swarm: `[embed.pso]` in the config.
 
 use espalier_model::diagnose::ParamError;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::choices::{Freedom, Pull, Start};
@@ -11,7 +12,7 @@ const ANY_SIZE: u32 = 1_000_000_000;
 const LEAST_PARTICLES: u32 = 16;
 
 /// The paper's particle swarm.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PsoParams {
     /// Which ratios a particle chooses on its own. Default `n`; the paper's is `s`. More freedom finds layouts

@@ -1,12 +1,13 @@
 //! The parameters of the solver: `[embed.solver]` in the config.
 
 use espalier_model::diagnose::ParamError;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::choices::KeepOut;
 
 /// Our optimiser, part by part.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SolverParams {
     /// Whether the sides of turns are searched first (exact lengths and angles stay). Default true; it chooses

@@ -5,12 +5,13 @@
 //! later one wins.
 
 use espalier_model::diagnose::ParamError;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::check_weight;
 
 /// Weights for a part of the tree.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct WeightRule {
     /// Where: branches of these generations, `[first, last]`, both included. The generation of a branch is the

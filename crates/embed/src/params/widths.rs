@@ -1,11 +1,12 @@
 //! The parameters of tubes: `[embed.widths]` in the config.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::choices::WidthsMode;
 
 /// What is done about tubes that overlap although their centrelines do not cross.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct WidthsParams {
     /// `report` only counts them, and says at which share of the radii there would be none. `avoid` lets lengths and

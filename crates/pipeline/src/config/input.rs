@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 use espalier_model::diagnose::ParamError;
 use espalier_model::swc::SwcScale;
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The variable that may begin a path, for data that lies elsewhere on every machine.
 const DATA_VARIABLE: &str = "$ESPALIER_DATA";
 
 /// What kind of thing the input is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum InputKind {
     /// By its name: `.swc`, `.vtp` and `.vtk` are trees, all else a volume.
@@ -24,7 +25,7 @@ pub enum InputKind {
 }
 
 /// A unit of length.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Unit {
     /// By the header of a volume; µm for a traced tree, mm if espalier wrote it or if it is of VTK.
@@ -51,7 +52,7 @@ impl Unit {
 }
 
 /// Where a run begins: a file or a phantom.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Input {
     /// A volume (NIfTI, NRRD, MetaImage: `.nii`, `.nii.gz`, `.hdr`, `.nrrd`, `.nhdr`, `.mha`, `.mhd`; a folder of

@@ -3,16 +3,27 @@
 //! **Steps** 1. Parse the text; an unknown key or a wrong type is an error at its line. 2. Lay `--set key=value`
 //! overrides over it; a preset settles what neither says. 3. Validate every stage's parameters; a value out of range is an error at its line.
 //! 4. [`Config::to_toml`] writes the resolved copy, every key with its value.
+//!
+//! What can be known of a key ([`keys`]), the JSON Schema ([`schema`]) and configs to start with ([`Template`]) are made from
+//! the same types.
 
 mod input;
+mod keys;
 mod place;
+mod ranges;
+mod schema;
+mod template;
 
 use std::path::{Path, PathBuf};
 
 use espalier_model::diagnose::{Class, Diagnose, ParamError};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use input::{Input, InputKind, Source, Unit};
+pub use keys::{Key, explain_keys, keys};
+pub use schema::{schema, schema_text};
+pub use template::Template;
 
 use crate::error::Error;
 use crate::stage::Stage;
@@ -21,7 +32,7 @@ use crate::stage::Stage;
 pub const SCHEMA: u32 = 1;
 
 /// A whole run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
     /// The version of the schema; 1.

@@ -26,7 +26,7 @@ use crate::run::{Summary, in_pool};
 use crate::settings;
 
 /// The most runs on a page.
-const MOST_RUNS: usize = 10_000;
+pub(crate) const MOST_RUNS: usize = 10_000;
 /// Side of a map in pixels, by how many runs there are at most: the page must pass as an attachment.
 const SIDES_PX: [(usize, u32); 4] = [(24, 320), (100, 220), (400, 150), (usize::MAX, 96)];
 

@@ -32,7 +32,7 @@ use crate::settings;
 use crate::stage::{Artifact, Stage};
 
 /// The most combinations: each is a run with files of its own.
-const MOST_COMBINATIONS: u64 = 10_000;
+pub(crate) const MOST_COMBINATIONS: u64 = 10_000;
 
 /// A sweep to be made.
 #[derive(Clone, Debug)]

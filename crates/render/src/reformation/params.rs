@@ -1,8 +1,10 @@
 //! The parameters of the scan on the map.
 
+use std::borrow::Cow;
 use std::fmt;
 
 use espalier_model::diagnose::ParamError;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -35,7 +37,7 @@ const NAMED: [(&str, Window); 5] = [
 ];
 
 /// What a slab shows of the values across it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Slab {
     /// Their mean: less noise.
@@ -48,7 +50,7 @@ pub enum Slab {
 }
 
 /// The parameters of the scan on the map.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct VolumeParams {
     /// The scan to be shown, a file in the same space as the tree, relative to the config's folder. Default: the run's
@@ -156,5 +158,19 @@ impl<'de> Visitor<'de> for WindowVisitor {
             Some(_) => Err(de::Error::invalid_length(3, &self)),
             None => Ok(Window::Range(range)),
         }
+    }
+}
+
+/// What the reader below takes, for the schema of the config.
+impl JsonSchema for Window {
+    fn schema_name() -> Cow<'static, str> {
+        "Window".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "anyOf": [
+            { "type": "string", "enum": NAMED.map(|(name, _)| name) },
+            { "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 },
+        ] })
     }
 }
