@@ -28,6 +28,8 @@ Examples:
   espalier locate out/airway -32.7,-168.8,-161.8        where is this point of the scan on the map?
   espalier sweep my.toml --over embed.w_length=0.5,1,2  losses against a setting: table and plot
   espalier group out -o group                           one page over all runs in a folder
+  espalier cohort samples.tsv -o out/cohort             all scans of a table, and the page over them
+  espalier bids data out participant --suffix mask      the volumes of a BIDS data set
   espalier phantom airway -o phantoms/airway            test data with its truth
   espalier config init vessel -o my.toml                a config to start with
   espalier config explain tree.root                     what a key means, its default and its range
@@ -144,6 +146,10 @@ pub(crate) enum Command {
     Sweep(SweepArguments),
     /// One page over many runs: maps, numbers, outliers, failures
     Group(GroupArguments),
+    /// Many scans from one table, each with its own settings; then one page over all:  espalier cohort SAMPLES.tsv
+    Cohort(CohortArguments),
+    /// The volumes of a BIDS data set, and the page over them:  espalier bids IN OUT participant, then group
+    Bids(BidsArguments),
     /// Make a phantom with its truth: CT, mask and tree
     Phantom(PhantomArguments),
     /// CT or label map -> mask:  espalier volume CT -o DIR
@@ -332,6 +338,121 @@ pub(crate) struct GroupArguments {
     #[arg(long, value_name = "TEXT")]
     pub(crate) title: Option<String>,
     /// Number the runs in place of their folders' names
+    #[arg(long)]
+    pub(crate) anonymous: bool,
+}
+
+const COHORT_HELP: &str = "\
+The table has tabs between its cells, a heading, and a row a scan. Columns:
+  id            what the scan is called: its run folder is DIR/runs/ID
+  path          the scan, mask, label map or traced tree, relative to the table; $ESPALIER_DATA is expanded
+  config        a config (.toml) to run it with, relative to the table
+  preset, label, labels, image, series, volume_index, seed      as the options of these names
+  embed.w_angle, tree.root, ...                                 any key of the config
+  note, note.age, ...                                           yours; not read
+Only id is needed, and path or config. An empty cell, or n/a, says nothing; lines that begin with # are passed over.
+Options of the command line have the last word over all rows.
+
+Does one scan after the other, and then DIR/group/group.html. A scan that fails stops no other: DIR/failures.tsv has the
+reason and the command that tries it again. The same command again does only what is missing, has failed, or has other
+settings or files now. The exit code is that of the first scan that failed.
+pipelines/cohort/Snakefile does the same with many jobs at once, here or on a cluster.
+
+Examples:
+  espalier cohort samples.tsv -o out/cohort
+  espalier cohort samples.tsv -o out/cohort --config airway.toml --set embed.w_angle=3
+  espalier cohort samples.tsv -o out/cohort --only case-07      one scan, without the page
+  espalier cohort samples.tsv -o out/cohort --group             the page alone, from what is there
+  espalier cohort samples.tsv -o out/cohort --list              the scans as JSON, for programs that do them";
+
+/// `espalier cohort`.
+#[derive(Debug, Args)]
+#[command(after_help = COHORT_HELP)]
+pub(crate) struct CohortArguments {
+    /// The table of the scans
+    #[arg(value_name = "SAMPLES")]
+    pub(crate) table: PathBuf,
+    /// Where the results go
+    #[arg(short, long, value_name = "DIR", default_value = "out/cohort")]
+    pub(crate) out: PathBuf,
+    /// Run the rows that name no config with this one
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+    /// Do only the scans with these ids, several with commas, and make no page
+    #[arg(long, value_name = "ID", value_delimiter = ',')]
+    pub(crate) only: Vec<String>,
+    /// Make only the page and the list of failures, from what is there
+    #[arg(long, conflicts_with_all = ["only", "list"])]
+    pub(crate) group: bool,
+    /// Do nothing; print the scans as JSON: folder, files, a digest of the settings, whether they are done
+    #[arg(long)]
+    pub(crate) list: bool,
+    #[command(flatten)]
+    pub(crate) page: PageArguments,
+    #[command(flatten)]
+    pub(crate) rerun: Rerun,
+}
+
+const BIDS_HELP: &str = "\
+participant runs every volume of the data set, sub-*/[ses-*/].../*.nii or .nii.gz, each to a run folder in OUT:
+OUT/sub-01/[ses-A/]anat/sub-01_ses-A_desc-airway_mask/. group makes OUT/group/group.html over all of them, with what is
+missing or has failed, and OUT/failures.tsv with the command that tries each again. OUT is a BIDS data set of derivatives,
+with dataset_description.json; run folders are named in .bidsignore.
+
+If the volumes have more than one suffix (mask, dseg, ct, ...), --suffix says which are meant. The data set must have a
+dataset_description.json, and volumes be named as their folders are, unless --skip-bids-validation is given. Participants
+may be done by jobs of their own, at the same time. The exit code is that of the first volume that failed.
+
+Examples:
+  espalier bids data data/derivatives/espalier participant --suffix mask
+  espalier bids data out participant --participant-label 01 02 --session-label baseline --suffix ct --preset airway
+  espalier bids data out participant --suffix dseg --filter desc=totalseg --label trachea
+  espalier bids data out group --suffix mask";
+
+/// `espalier bids`.
+#[derive(Debug, Args)]
+#[command(after_help = BIDS_HELP)]
+pub(crate) struct BidsArguments {
+    /// The data set
+    #[arg(value_name = "IN")]
+    pub(crate) input: PathBuf,
+    /// Where the results go
+    #[arg(value_name = "OUT")]
+    pub(crate) out: PathBuf,
+    /// The volumes one by one, or the page over them
+    #[arg(value_name = "participant|group", value_parser = ["participant", "group"])]
+    pub(crate) level: String,
+    /// Only these participants, labels with or without sub-
+    #[arg(long, alias = "participant_label", value_name = "LABEL", num_args = 1..)]
+    pub(crate) participant_label: Vec<String>,
+    /// Only these sessions, labels with or without ses-
+    #[arg(long, alias = "session_label", value_name = "LABEL", num_args = 1..)]
+    pub(crate) session_label: Vec<String>,
+    /// Take the data set as it is
+    #[arg(long, aliases = ["skip_bids_validation", "skip-bids-validator", "skip_bids_validator"])]
+    pub(crate) skip_bids_validation: bool,
+    /// What the names of the volumes end with, such as mask [default: that of all, if they have but one]
+    #[arg(long, value_name = "SUFFIX")]
+    pub(crate) suffix: Option<String>,
+    /// Only volumes with this entity, such as desc=airway, run=1, datatype=anat; desc= for those without
+    #[arg(long = "filter", value_name = "ENTITY=VALUE", value_parser = parse_filter)]
+    pub(crate) filters: Vec<(String, String)>,
+    /// Run them with this config
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) page: PageArguments,
+    #[command(flatten)]
+    pub(crate) rerun: Rerun,
+}
+
+/// How a page over many scans is made.
+#[derive(Debug, Args)]
+pub(crate) struct PageArguments {
+    /// The heading of the page
+    #[arg(long, value_name = "TEXT")]
+    pub(crate) title: Option<String>,
+    /// Number the scans on the page in place of their names
     #[arg(long)]
     pub(crate) anonymous: bool,
 }
@@ -556,6 +677,16 @@ fn parse_point(text: &str) -> Result<[f64; 3], String> {
 fn parse_override(text: &str) -> Result<Override, String> {
     let (key, value) = text.split_once('=').ok_or("write KEY=VALUE, such as embed.w_angle=3")?;
     Ok(Override { key: key.trim().to_owned(), value: value.trim().to_owned() })
+}
+
+fn parse_filter(text: &str) -> Result<(String, String), String> {
+    let (key, value) = text.split_once('=').ok_or("write ENTITY=VALUE, such as desc=airway")?;
+    let is_key = !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric());
+    if is_key {
+        Ok((key.to_owned(), value.to_owned()))
+    } else {
+        Err("an entity has letters and digits".to_owned())
+    }
 }
 
 fn parse_axis(text: &str) -> Result<Axis, String> {

@@ -22,7 +22,7 @@ use crate::args::{
     SweepArguments, VerifyArguments,
 };
 use crate::progress::{self, Progress};
-use crate::{checks, config, explain, info};
+use crate::{checks, cohort, config, explain, info};
 
 /// Memory assumed where the machine does not tell its own.
 const FALLBACK_MEMORY_BYTES: u64 = 4 << 30;
@@ -36,6 +36,8 @@ pub(crate) fn execute(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Juxtapose(juxtapose) => run_juxtapose(arguments, juxtapose)?,
         Command::Sweep(sweep) => run_sweep(arguments, sweep)?,
         Command::Group(group) => run_group(arguments, group)?,
+        Command::Cohort(cohort) => return cohort::execute(arguments, cohort),
+        Command::Bids(bids) => return cohort::execute_bids(arguments, bids),
         Command::Phantom(phantom) => make_phantom(arguments, phantom)?,
         Command::Volume(stage) => run_stage(arguments, stage, Stage::Volume)?,
         Command::Skeleton(stage) => run_stage(arguments, stage, Stage::Skeleton)?,
@@ -57,11 +59,16 @@ pub(crate) fn execute(arguments: &Arguments) -> anyhow::Result<()> {
             return Ok(());
         }
     };
+    print_summary(&summary);
+    Ok(())
+}
+
+/// Prints the files that say most, and the digest.
+pub(crate) fn print_summary(summary: &Summary) {
     for file in &summary.highlights {
         progress::result(&summary.out.join(file).display().to_string());
     }
     progress::result(&format!("digest {}", summary.digest));
-    Ok(())
 }
 
 /// The script that completes commands and options.
@@ -175,14 +182,19 @@ pub(crate) fn report_failure(error: &anyhow::Error) -> ExitCode {
     let (code, class, hint) = known.map_or(("E-USAGE", Class::Usage, String::new()), |known| {
         (known.code(), known.class(), known.hint())
     });
+    print_error(code, error, &hint);
+    ExitCode::from(class.exit_code())
+}
+
+/// Prints an error with its code and way out.
+pub(crate) fn print_error(code: &str, error: &dyn std::fmt::Display, hint: &str) {
     progress::line(&format!("error[{code}]: {error}"));
     if !hint.is_empty() {
         progress::line(&format!("  hint: {hint}"));
     }
-    if espalier_pipeline::explain::is_worth_reading(code, &hint) {
+    if espalier_pipeline::explain::is_worth_reading(code, hint) {
         progress::line(&format!("  more: espalier explain {code}"));
     }
-    ExitCode::from(class.exit_code())
 }
 
 fn run_pipeline(arguments: &Arguments, run: &RunArguments) -> anyhow::Result<Summary> {
@@ -480,13 +492,13 @@ fn load_input(path: &Path, overrides: &[Override]) -> anyhow::Result<Loaded> {
 }
 
 #[allow(clippy::disallowed_methods, reason = "the command line is where the environment is read")]
-fn data_dir() -> Option<PathBuf> {
+pub(crate) fn data_dir() -> Option<PathBuf> {
     std::env::var_os("ESPALIER_DATA").map(PathBuf::from)
 }
 
 /// The store that runs share: none unless somebody has said where it lies.
 #[allow(clippy::disallowed_methods, reason = "the command line is where the environment is read")]
-fn cache(arguments: &Arguments) -> Option<Cache> {
+pub(crate) fn cache(arguments: &Arguments) -> Option<Cache> {
     let named = arguments.common.cache.clone();
     let folder = named.or_else(|| std::env::var_os("ESPALIER_CACHE").map(PathBuf::from))?;
     let max_bytes = arguments.common.cache_size;

@@ -6,6 +6,7 @@
 mod args;
 mod cancel;
 mod checks;
+mod cohort;
 mod commands;
 mod config;
 mod explain;

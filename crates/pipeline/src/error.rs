@@ -10,6 +10,9 @@ use crate::config::ConfigError;
 use crate::settings::Difference;
 use crate::stage::{Artifact, Stage};
 
+/// How many of the problems of a table are told at once.
+const MOST_PROBLEMS: usize = 20;
+
 /// Why a run stopped.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -56,6 +59,72 @@ pub enum Error {
         folder: PathBuf,
         /// The file that is not there.
         missing: &'static str,
+    },
+    /// A table of scans that cannot be used.
+    #[error("{path}: {}", listed(problems), path = path.display())]
+    Samples {
+        /// The table.
+        path: PathBuf,
+        /// What is wrong with it, each with its line.
+        problems: Vec<String>,
+    },
+    /// A scan that is not in the table.
+    #[error("there is no scan {id} in the table")]
+    NoSample {
+        /// The id asked for.
+        id: String,
+    },
+    /// Scans of a cohort that failed.
+    #[error("{n_failed} of {n_samples} scans failed; the first: {first} ({})", cause.code())]
+    Cohort {
+        /// How many failed.
+        n_failed: usize,
+        /// How many there are.
+        n_samples: usize,
+        /// The first of them.
+        first: String,
+        /// Why that one failed.
+        cause: Box<Error>,
+    },
+    /// A BIDS data set that is not one.
+    #[error("{path}: {problem}", path = path.display())]
+    BidsDataset {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+    /// Results would lie in a data set of another program.
+    #[error("{folder} holds a data set that espalier did not make", folder = folder.display())]
+    BidsOutput {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// Volumes of several kinds.
+    #[error("the data set has volumes of several kinds: {suffixes}")]
+    BidsSuffix {
+        /// Their suffixes, and how many have each.
+        suffixes: String,
+    },
+    /// A data set without a volume that is meant.
+    #[error("{folder} has no volume that is meant: suffix {suffix}{filters}", folder = folder.display())]
+    NoBidsScan {
+        /// The data set.
+        folder: PathBuf,
+        /// The suffix.
+        suffix: String,
+        /// The other conditions.
+        filters: String,
+    },
+    /// A participant or session that is not there.
+    #[error("there is no {what} {label}; there are {there}")]
+    NoBidsLabel {
+        /// `participant` or `session`.
+        what: &'static str,
+        /// The label asked for.
+        label: String,
+        /// The labels there are.
+        there: String,
     },
     /// None of the folders of a group holds a run.
     #[error("{} holds no run folder", shown(folders))]
@@ -324,6 +393,15 @@ fn shown(folders: &[PathBuf]) -> String {
     if more > 0 { format!("none of {} and {more} more", named.join(", ")) } else { named.join(" or ") }
 }
 
+/// The first of many things that are wrong, a line each.
+fn listed(problems: &[String]) -> String {
+    let mut lines = problems.iter().take(MOST_PROBLEMS).cloned().collect::<Vec<_>>();
+    if problems.len() > MOST_PROBLEMS {
+        lines.push(format!("and {} more", problems.len() - MOST_PROBLEMS));
+    }
+    lines.join("\n  ")
+}
+
 impl Error {
     pub(crate) fn stage(stage: Stage) -> impl Fn(Box<dyn Diagnose + Send + Sync>) -> Self {
         move |cause| Self::Stage { stage, cause }
@@ -345,6 +423,14 @@ impl Diagnose for Error {
             Self::Point { cause, .. } => cause.code(),
             Self::NoSuchSpace { .. } => "E-LOCATE-SPACE",
             Self::NoRun { .. } => "E-COMPARE-NO-RUN",
+            Self::Samples { .. } => "E-COHORT-TABLE",
+            Self::NoSample { .. } => "E-COHORT-NO-SCAN",
+            Self::Cohort { .. } => "E-COHORT-FAILED",
+            Self::BidsDataset { .. } => "E-BIDS-DATASET",
+            Self::BidsOutput { .. } => "E-BIDS-OUTPUT",
+            Self::BidsSuffix { .. } => "E-BIDS-SUFFIX",
+            Self::NoBidsScan { .. } => "E-BIDS-NO-SCAN",
+            Self::NoBidsLabel { .. } => "E-BIDS-LABEL",
             Self::NoGroup { .. } => "E-GROUP-NO-RUN",
             Self::GroupSize { .. } => "E-GROUP-SIZE",
             Self::RunInTheWay { .. } => "E-COMPARE-FOLDER",
@@ -375,7 +461,12 @@ impl Diagnose for Error {
             Self::Config(error) => error.class(),
             Self::Stage { cause, .. } | Self::File { cause, .. } => cause.class(),
             Self::Point { cause, .. } => cause.class(),
-            Self::NoSuchStage { .. }
+            Self::Cohort { cause, .. } => cause.class(),
+            Self::Samples { .. }
+            | Self::NoSample { .. }
+            | Self::BidsSuffix { .. }
+            | Self::NoBidsLabel { .. }
+            | Self::NoSuchStage { .. }
             | Self::NoSuchPlace { .. }
             | Self::PlotFormat { .. }
             | Self::ResultInTheWay { .. }
@@ -393,15 +484,17 @@ impl Diagnose for Error {
             | Self::UnknownCode { .. }
             | Self::UnknownKey { .. }
             | Self::Threads { .. } => Class::Usage,
+            Self::BidsDataset { .. } => Class::Input,
             Self::NoRun { .. }
             | Self::NoGroup { .. }
+            | Self::NoBidsScan { .. }
             | Self::NoTree { .. }
             | Self::MissingArtifact { .. }
             | Self::Read { .. }
             | Self::Write { .. } => Class::Io,
             Self::Altered { .. } | Self::Certificate { .. } | Self::Unverified { .. } => Class::Uncertified,
             Self::TooLarge { .. } | Self::Memory { .. } => Class::Limit,
-            Self::Create { .. } => Class::CannotCreate,
+            Self::Create { .. } | Self::BidsOutput { .. } => Class::CannotCreate,
             Self::Locked { .. } => Class::Locked,
         }
     }
@@ -422,6 +515,16 @@ impl Diagnose for Error {
             Self::SettledTree { .. } => {
                 "of finished runs seed, views.*, embed.* and render.* can be changed; or give the configs".to_owned()
             }
+            Self::Samples { .. } => {
+                "columns are id, path, config, preset, label, labels, image, series, volume_index, seed, keys of the config such as embed.w_angle, and notes such as note or note.age; an empty cell or n/a says nothing".to_owned()
+            }
+            Self::NoSample { .. } => "the column id has the ids".to_owned(),
+            Self::BidsDataset { .. } => "mend it, or take the data set as it is with --skip-bids-validation".to_owned(),
+            Self::BidsOutput { .. } => "name a folder of its own for the results, such as derivatives/espalier".to_owned(),
+            Self::BidsSuffix { .. } => "say which with --suffix, and --filter desc=… if one kind has several".to_owned(),
+            Self::NoBidsScan { .. } => "volumes lie in sub-*/[ses-*/] and end with .nii or .nii.gz; see --suffix and --filter".to_owned(),
+            Self::NoBidsLabel { .. } => "labels are what stands after sub- and ses-".to_owned(),
+            Self::Cohort { .. } => "failures.tsv has the reasons, and the command that tries each again".to_owned(),
             Self::NoGroup { .. } => {
                 "name run folders, or a folder that has run folders in it, such as the one that espalier run writes to".to_owned()
             }

@@ -13,6 +13,7 @@ use espalier_model::Diagnose;
 use espalier_model::diagnose::Class;
 
 use crate::error::Error;
+use crate::explain::explain;
 use crate::folder::RunFolder;
 
 pub(crate) const FILE: &str = "provenance/failure.json";
@@ -32,23 +33,33 @@ pub(crate) struct Failure {
     pub(crate) reason: String,
 }
 
-/// Notes why a run stopped. A folder that cannot be written to has other troubles.
+/// Notes why a run stopped.
 pub(crate) fn write(folder: &RunFolder, error: &Error) {
     // A command that asks for what cannot be says nothing of the results that are there.
-    if matches!(error.class(), Class::Usage | Class::Locked) {
-        return;
+    if !matches!(error.class(), Class::Usage | Class::Locked) {
+        note(folder, error);
     }
+}
+
+/// Notes why a run stopped that its cohort waits for, whatever the reason. A folder that cannot be written to has other
+/// troubles.
+pub(crate) fn note(folder: &RunFolder, error: &Error) {
     let stage = if let Error::Stage { stage, .. } = error { Some(stage.name().to_owned()) } else { None };
     let failure = Failure {
         format: FORMAT.to_owned(),
         version: VERSION,
         stage,
         code: error.code().to_owned(),
-        // The message itself may quote the input.
-        reason: error.class().meaning().to_owned(),
+        reason: reason(error),
     };
     let json = serde_json::to_string_pretty(&failure).unwrap_or_default() + "\n";
     let _ = folder.write_aside(FILE, json.as_bytes());
+}
+
+/// What the code stands for in the catalogue, else what its class has in common. The message itself may quote the input.
+fn reason(error: &Error) -> String {
+    let of_code = explain(error.code()).map(|entry| entry.title().to_owned());
+    of_code.unwrap_or_else(|_| error.class().meaning().to_owned())
 }
 
 /// Forgets why an earlier run stopped.

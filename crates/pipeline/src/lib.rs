@@ -11,6 +11,8 @@
 //! | two runs on one shared map | [`juxtapose`](mod@juxtapose) |
 //! | a config at many settings | [`sweep`](mod@sweep) |
 //! | one page over many runs | [`group`](mod@group) |
+//! | many scans from one table, and the page over them | [`cohort`] |
+//! | the scans of a BIDS data set | [`bids`](mod@bids) |
 //! | the run folder: atomic files, digests; one run at a time | `folder`, `lock` |
 //! | what a stage's results were made from, and whether they still stand | `record` |
 //! | results that runs share | `cache` |
@@ -31,8 +33,10 @@
 //! **Architecture Invariant:** nothing is printed here; the caller is told by [`Event`]s.
 
 mod artifacts;
+pub mod bids;
 mod cache;
 mod clock;
+pub mod cohort;
 pub mod compare;
 pub mod config;
 mod dictionary;
@@ -58,6 +62,7 @@ mod record;
 pub mod run;
 mod scan_of_map;
 mod settings;
+mod shell;
 mod side_file;
 mod space;
 pub mod stage;
@@ -66,7 +71,11 @@ pub mod sweep;
 mod tree_outputs;
 mod verify;
 
+pub use bids::{BidsRequest, bids};
 pub use cache::Cache;
+pub use cohort::{
+    Absent, Cohort, CohortPage, CohortRequest, Effort, FailedSample, PageRequest, Sample, Turn,
+};
 pub use compare::{CompareRequest, Compared, Subject, compare};
 pub use config::{Config, ConfigError, Loaded, Override};
 pub use doctor::{Advice, DoctorRequest, Examined, Fact, costs_table, doctor};

@@ -90,6 +90,11 @@ impl Settings {
     }
 }
 
+/// A config as a text that is the same for equal settings, on any machine.
+pub(crate) fn portable_text(config: &Config) -> String {
+    toml::to_string(&portable(config)).unwrap_or_default()
+}
+
 /// Whether a stage's results depend on a setting.
 fn concerns(stage: Stage, key: &str) -> bool {
     let table = key.split('.').next().unwrap_or_default();

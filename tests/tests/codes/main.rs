@@ -20,8 +20,9 @@ const UNRAISED: &[(&str, &str)] = &[
     ("E-JUXTAPOSE-TREE", "both trees are legal, and no pair is known that coincides once it is moved"),
 ];
 
-/// Codes that are given elsewhere than in `Diagnose`, with their exit codes.
-const ELSEWHERE: &[(&str, &[u8])] = &[("E-USAGE", &[2]), ("E-GROUP-UNFINISHED", &[])];
+/// Codes that are given elsewhere than in `Diagnose`, or whose class is that of another error, with their exit codes.
+const ELSEWHERE: &[(&str, &[u8])] =
+    &[("E-USAGE", &[2]), ("E-GROUP-UNFINISHED", &[]), ("E-COHORT-FAILED", &[1, 2, 3, 5, 6, 8, 73, 74, 75])];
 
 #[test]
 fn every_code_has_an_entry_and_every_entry_a_source() {

@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The variable that may begin a path, for data that lies elsewhere on every machine.
-const DATA_VARIABLE: &str = "$ESPALIER_DATA";
+pub(crate) const DATA_VARIABLE: &str = "$ESPALIER_DATA";
 
 /// What kind of thing the input is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

@@ -20,6 +20,7 @@ use espalier_model::diagnose::{Class, Diagnose, ParamError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub(crate) use input::DATA_VARIABLE;
 pub use input::{Input, InputKind, Source, Unit};
 pub use keys::{Key, explain_keys, keys};
 pub use schema::{schema, schema_text};

@@ -21,7 +21,7 @@ const PARTS: [(&str, &str); 10] = [
     ("skeleton, radius, tree", include_str!("tree.toml")),
     ("views, embed", include_str!("embed.toml")),
     ("render, report", include_str!("picture.toml")),
-    ("compare, juxtapose, sweep, group, profile, locate", include_str!("runs.toml")),
+    ("compare, juxtapose, sweep, group, cohort, bids, profile, locate", include_str!("runs.toml")),
     ("phantom", include_str!("phantom.toml")),
     ("doctor", include_str!("doctor.toml")),
 ];

@@ -30,7 +30,7 @@ pub(super) fn of(paths: &[&Path]) -> Vec<String> {
 }
 
 /// Numbers in place of labels.
-pub(super) fn numbered(n: usize) -> Vec<String> {
+pub(crate) fn numbered(n: usize) -> Vec<String> {
     let width = n.to_string().len();
     (1..=n).map(|i| format!("run-{i:0width$}")).collect()
 }

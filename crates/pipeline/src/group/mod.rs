@@ -17,13 +17,15 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use espalier_report::group::{GroupOutcome, GroupRun};
+use espalier_report::group::{Failed, GroupOutcome, GroupRun};
 use rayon::prelude::*;
 
 use crate::error::Error;
 use crate::folder::RunFolder;
 use crate::run::{Summary, in_pool};
 use crate::settings;
+
+pub(crate) use labels::numbered;
 
 /// The most runs on a page.
 pub(crate) const MOST_RUNS: usize = 10_000;
@@ -64,45 +66,95 @@ struct Found {
     is_run: bool,
 }
 
+/// A run on a page.
+pub(crate) struct Member {
+    pub(crate) label: String,
+    pub(crate) folder: PathBuf,
+    /// Why it has no map, where whoever asks knows that it has none.
+    pub(crate) failed: Option<Failed>,
+    /// The command that does it again, where it is not that of its next stage.
+    pub(crate) retry: Option<String>,
+}
+
+/// Where a page goes, and its heading.
+pub(crate) struct GroupPage<'a> {
+    pub(crate) out: &'a Path,
+    pub(crate) title: &'a str,
+    pub(crate) threads: Option<usize>,
+}
+
+/// A page that was made.
+pub(crate) struct Shown {
+    /// The sums, for a terminal.
+    pub(crate) table: String,
+    /// The runs as they are shown.
+    pub(crate) runs: Vec<GroupRun>,
+    pub(crate) summary: Summary,
+}
+
 /// Shows a group of runs.
 ///
 /// # Errors
 /// [`Error`] if no folder is a run folder, there are too many, or the results cannot be written. A run that cannot be read
 /// is no error: the page lists it.
 pub fn group(request: &GroupRequest) -> Result<Grouped, Error> {
-    if request.out.join(settings::FILE).exists() {
-        return Err(Error::RunInTheWay { folder: request.out.clone() });
-    }
+    refuse_run_folder(&request.out)?;
     let (found, notes) = find(request)?;
     let paths: Vec<&Path> = found.iter().map(|found| found.given.as_path()).collect();
     let labels = if request.is_anonymous { labels::numbered(paths.len()) } else { labels::of(&paths) };
-    let side_px = SIDES_PX.iter().find(|(most, _)| found.len() <= *most).map_or(96, |(_, side)| *side);
-    let runs: Vec<GroupRun> = in_pool(request.threads, || {
-        let read = |(found, label): (&Found, &String)| {
-            let outcome = if found.is_run {
-                read::run(&found.given, label, side_px)
-            } else {
-                GroupOutcome::Failed(read::no_run(&found.given))
-            };
-            GroupRun { label: label.clone(), outcome }
-        };
-        Ok(found.par_iter().zip(&labels).map(read).collect())
-    })?;
+    let member = |(found, label): (Found, String)| Member {
+        label,
+        failed: (!found.is_run).then(|| read::no_run(&found.given)),
+        folder: found.given,
+        retry: None,
+    };
+    let members: Vec<Member> = found.into_iter().zip(labels).map(member).collect();
     let title = request.title.as_deref().filter(|title| !title.trim().is_empty());
-    let made = espalier_report::group::group(title.unwrap_or("Group of runs"), &runs);
+    let title = title.unwrap_or("Group of runs");
+    let shown = show(&members, &GroupPage { out: &request.out, title, threads: request.threads })?;
+    Ok(Grouped { table: shown.table, notes, summary: shown.summary })
+}
+
+/// Makes the page over these runs.
+pub(crate) fn show(members: &[Member], page: &GroupPage<'_>) -> Result<Shown, Error> {
+    refuse_run_folder(page.out)?;
+    let side_px = SIDES_PX.iter().find(|(most, _)| members.len() <= *most).map_or(96, |(_, side)| *side);
+    let runs: Vec<GroupRun> =
+        in_pool(page.threads, || Ok(members.par_iter().map(|member| shown_run(member, side_px)).collect()))?;
+    let made = espalier_report::group::group(page.title, &runs);
     let files = [
         ("group.html", made.html),
         ("group.tsv", made.tsv),
         ("group.json", made.json),
         ("dictionary.tsv", made.dictionary),
     ];
-    let mut folder = RunFolder::open(&request.out)?;
+    let mut folder = RunFolder::open(page.out)?;
     for (file, text) in &files {
         folder.write(file, text.as_bytes())?;
     }
     let highlights = files.iter().map(|(file, _)| (*file).to_owned()).collect();
-    let summary = Summary { out: request.out.clone(), highlights, digest: folder.seal()? };
-    Ok(Grouped { table: made.summary, notes, summary })
+    let summary = Summary { out: page.out.to_owned(), highlights, digest: folder.seal()? };
+    Ok(Shown { table: made.summary, runs, summary })
+}
+
+fn shown_run(member: &Member, side_px: u32) -> GroupRun {
+    let known = member.failed.clone().map(GroupOutcome::Failed);
+    let mut outcome = known.unwrap_or_else(|| read::run(&member.folder, &member.label, side_px));
+    if let (GroupOutcome::Failed(failed), Some(retry)) = (&mut outcome, &member.retry) {
+        failed.retry = Some(retry.clone());
+    }
+    GroupRun { label: member.label.clone(), outcome }
+}
+
+/// Why the run that a folder was meant for has no map.
+pub(crate) fn without_map(folder: &Path, label: &str) -> Failed {
+    if is_run(folder) { read::unfinished(&RunFolder::to_read(folder), label) } else { read::no_run(folder) }
+}
+
+/// Results of a group must not lie among those of a run.
+fn refuse_run_folder(out: &Path) -> Result<(), Error> {
+    let is_in_the_way = out.join(settings::FILE).exists();
+    if is_in_the_way { Err(Error::RunInTheWay { folder: out.to_owned() }) } else { Ok(()) }
 }
 
 /// Every run folder once, in the order in which they were given, those of one folder by name; and what is to be said.

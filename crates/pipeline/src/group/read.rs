@@ -1,8 +1,8 @@
 //! A run as a group shows it.
 //!
 //! **Input** a run folder. **Output** its numbers and its map in small, or why there are none.
-//! **Steps** 1. Without an embedding the run is unfinished: the reason is what it has noted itself, else that it ended
-//! after its last stage. 2. Tree and embedding, then what the stages said. 3. The small map.
+//! **Steps** 1. A run that has noted why it stopped, or has no embedding, is unfinished: the reason is that note, else that it
+//! ended after its last stage. 2. Tree and embedding, then what the stages said. 3. The small map.
 //! **Guarantees** nothing is written; each file is checked against the run's digests; a reason holds no path.
 
 use std::collections::BTreeMap;
@@ -18,6 +18,7 @@ use crate::folder::RunFolder;
 use crate::page::{LEDGER, said};
 use crate::provenance;
 use crate::settings;
+use crate::shell;
 use crate::stage::{Artifact, Stage};
 
 /// A folder without a run in it.
@@ -35,7 +36,8 @@ pub(super) fn no_run(path: &Path) -> Failed {
 /// What a run came to.
 pub(super) fn run(path: &Path, label: &str, side_px: u32) -> GroupOutcome {
     let folder = RunFolder::to_read(path);
-    if !path.join(Artifact::Embedding.file()).exists() {
+    // What an earlier run has left beside such a note is not what was asked for last.
+    if failure::read(path).is_some() || !path.join(Artifact::Embedding.file()).exists() {
         return GroupOutcome::Failed(unfinished(&folder, label));
     }
     match mapped(&folder, side_px) {
@@ -50,13 +52,15 @@ pub(super) fn run(path: &Path, label: &str, side_px: u32) -> GroupOutcome {
 }
 
 /// A run that has no map yet.
-fn unfinished(folder: &RunFolder, label: &str) -> Failed {
+pub(super) fn unfinished(folder: &RunFolder, label: &str) -> Failed {
     let done = done_to(folder);
     // A traced phantom has no scan, so that its tree comes next.
     let is_traced = done == Some(Stage::Phantom) && !folder.path().join(Artifact::Volume.file()).exists();
     let comes_next = |stage: &Stage| Some(*stage) > done && (*stage >= Stage::Tree || !is_traced);
     let next = Stage::ALL.into_iter().find(comes_next);
     let noted = failure::read(folder.path());
+    let stopped = noted.as_ref().and_then(|failure| Stage::from_name(failure.stage.as_deref()?));
+    let is_next = |next: &Stage| stopped.is_none_or(|stage| stage >= *next);
     let (code, reason) = match noted {
         Some(failure) => {
             let stage = failure.stage.map(|stage| format!("{stage}: ")).unwrap_or_default();
@@ -70,9 +74,10 @@ fn unfinished(folder: &RunFolder, label: &str) -> Failed {
             ("E-GROUP-UNFINISHED".to_owned(), reason)
         }
     };
-    let retry = match (done, next) {
+    // What lies behind the stage that failed was made with other settings, or from another input.
+    let retry = match (done, next.filter(is_next)) {
         (Some(_), Some(next)) => retry(next, label),
-        _ => format!("espalier run CONFIG -o {}", quoted(label)),
+        _ => format!("espalier run CONFIG -o {}", shell::word(label)),
     };
     Failed { code, reason, done_to: done.map(|stage| stage.name().to_owned()), retry: Some(retry) }
 }
@@ -85,16 +90,9 @@ fn done_to(folder: &RunFolder) -> Option<Stage> {
 
 /// The commands that do a stage and all later ones, each with the folder's own settings.
 fn retry(from: Stage, label: &str) -> String {
-    let label = quoted(label);
+    let label = shell::word(label);
     let stages = Stage::ALL.into_iter().filter(|stage| *stage >= from && *stage > Stage::Phantom);
     stages.map(|stage| format!("espalier {stage} {label}")).collect::<Vec<_>>().join(" && ")
-}
-
-/// A label as a word of a shell.
-fn quoted(label: &str) -> String {
-    let is_plain = label.chars().all(|c| c.is_ascii_alphanumeric() || "._-/".contains(c));
-    let is_plain = is_plain && !label.starts_with('-') && !label.is_empty();
-    if is_plain { label.to_owned() } else { format!("'{}'", label.replace('\'', "'\\''")) }
 }
 
 /// What an error says, without the path of its file.

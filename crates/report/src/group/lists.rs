@@ -80,7 +80,7 @@ pub(super) fn failures(group: &Group<'_>) -> Markup {
         return html! { p { "None: every run has a map." } };
     }
     html! {
-        p.note { "Commands start from the folder that the labels start from." }
+        p.note { "Commands start from the folder that their paths start from." }
         (table("failures", &heads, &rows))
     }
 }

@@ -1,0 +1,108 @@
+//! Many scans at one command: `espalier cohort` and `espalier bids`.
+
+use espalier_model::Diagnose;
+use espalier_pipeline::{BidsRequest, Cohort, CohortPage, CohortRequest, Effort, PageRequest, Sample, Turn};
+
+use crate::args::{Arguments, BidsArguments, CohortArguments, PageArguments, Rerun};
+use crate::commands::{cache, data_dir, half_of_memory, print_error, print_summary};
+use crate::progress::{self, Progress};
+
+/// `espalier cohort`.
+pub(crate) fn execute(arguments: &Arguments, cohort: &CohortArguments) -> anyhow::Result<()> {
+    let request = CohortRequest {
+        table: cohort.table.clone(),
+        out: cohort.out.clone(),
+        config: cohort.config.clone(),
+        overrides: arguments.common.overrides.clone(),
+        data_dir: data_dir(),
+    };
+    let all = Cohort::read(&request)?;
+    let effort = effort(arguments, cohort.rerun);
+    if !cohort.only.is_empty() {
+        let chosen = all.only(&cohort.only)?;
+        return if cohort.list { print_list(&chosen, &effort) } else { perform(arguments, &chosen, &effort) };
+    }
+    if cohort.list {
+        return print_list(&all, &effort);
+    }
+    let done = if cohort.group { Ok(()) } else { perform(arguments, &all, &effort) };
+    print_page(arguments, &all, &cohort.page)?;
+    done
+}
+
+/// `espalier bids`.
+pub(crate) fn execute_bids(arguments: &Arguments, bids: &BidsArguments) -> anyhow::Result<()> {
+    let cohort = espalier_pipeline::bids(&BidsRequest {
+        input: bids.input.clone(),
+        out: bids.out.clone(),
+        participants: bids.participant_label.clone(),
+        sessions: bids.session_label.clone(),
+        suffix: bids.suffix.clone(),
+        filters: bids.filters.clone(),
+        skip_validation: bids.skip_bids_validation,
+        config: bids.config.clone(),
+        overrides: arguments.common.overrides.clone(),
+        data_dir: data_dir(),
+    })?;
+    if bids.level == "group" {
+        return print_page(arguments, &cohort, &bids.page);
+    }
+    for absent in &cohort.absent {
+        progress::line(&format!("note: {}: {}", absent.id, absent.reason));
+    }
+    perform(arguments, &cohort, &effort(arguments, bids.rerun))
+}
+
+/// How scans are done.
+fn effort(arguments: &Arguments, rerun: Rerun) -> Effort {
+    let Rerun { force, wait } = rerun;
+    Effort {
+        threads: arguments.common.threads.map(usize::from),
+        max_memory_bytes: arguments.common.max_memory.unwrap_or_else(half_of_memory),
+        data_dir: data_dir(),
+        force,
+        wait,
+        cache: cache(arguments),
+    }
+}
+
+fn print_list(cohort: &Cohort, effort: &Effort) -> anyhow::Result<()> {
+    progress::result(cohort.list(effort).trim_end());
+    Ok(())
+}
+
+/// Does the scans; of each its id, how it goes, and its digest or its error.
+fn perform(arguments: &Arguments, cohort: &Cohort, effort: &Effort) -> anyhow::Result<()> {
+    let show = Progress::new(arguments.common.quiet);
+    let n_samples = cohort.samples.len();
+    let said = |sample: &Sample, turn: Turn<'_>| match turn {
+        Turn::Begins if arguments.common.quiet => {}
+        Turn::Begins => progress::line(&format!("== {}", sample.id)),
+        Turn::Done(summary) => progress::result(&format!("{}\tdigest {}", sample.id, summary.digest)),
+        // The error of a single scan is that of the command.
+        Turn::Failed(_) if n_samples == 1 => {}
+        Turn::Failed(error) => {
+            progress::line(&format!("{} failed", sample.id));
+            print_error(error.code(), error, &error.hint());
+        }
+    };
+    Ok(cohort.perform(effort, &|event| show.show(event), &said)?)
+}
+
+/// Makes the page and prints what it says of failures.
+fn print_page(arguments: &Arguments, cohort: &Cohort, page: &PageArguments) -> anyhow::Result<()> {
+    let request = PageRequest {
+        title: page.title.clone(),
+        is_anonymous: page.anonymous,
+        threads: arguments.common.threads.map(usize::from),
+    };
+    let CohortPage { table, failed, failures_file, summary } = cohort.page(&request)?;
+    progress::result(&table);
+    for failed in &failed {
+        let retry = failed.retry.as_ref().map(|retry| format!("\n    {retry}")).unwrap_or_default();
+        progress::result(&format!("{}  {}  {}{retry}", failed.id, failed.code, failed.reason));
+    }
+    progress::result(&failures_file.display().to_string());
+    print_summary(&summary);
+    Ok(())
+}

@@ -1,0 +1,253 @@
+//! Many scans from one table, as their user meets them.
+#![allow(clippy::expect_used, reason = "a test says what it expects")]
+
+mod program;
+
+use std::fs;
+use std::path::Path;
+
+use program::{espalier, stderr};
+use serde_json::Value;
+
+const QUICK: [&str; 8] = [
+    "--set",
+    "embed.pso.particles=16",
+    "--set",
+    "embed.pso.iterations=3",
+    "--set",
+    "render.width_px=300",
+    "--set",
+    "report.enabled=false",
+];
+
+/// A fork whose trunk has this length, in mm.
+fn fork(length_mm: f64) -> String {
+    let end = length_mm + 6.0;
+    format!("1 1 0 0 0 2 -1\n2 3 0 -{length_mm} 0 2 1\n3 3 5 -{end} 0 1.2 2\n4 3 -5 -{end} 0 1.2 2\n")
+}
+
+/// Two forks, a mask with a loop that is refused, and a scan that is not there.
+fn data() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let at = folder.path().join("data");
+    fs::create_dir(&at).expect("folder");
+    fs::write(at.join("one.swc"), fork(20.0)).expect("writable");
+    fs::write(at.join("two.swc"), fork(30.0)).expect("writable");
+    let torus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/torus.nii.gz");
+    fs::copy(torus, at.join("torus.nii.gz")).expect("copied");
+    let table = "id\tpath\tinput.unit\ttree.loops\tnote\n\
+                 a\tone.swc\tmm\t\tfirst\nb\tlost.swc\tmm\t\t\nc\ttorus.nii.gz\tn/a\trefuse\t\nd\ttwo.swc\tmm\t\t\n";
+    fs::write(at.join("samples.tsv"), table).expect("writable");
+    folder
+}
+
+struct Said {
+    code: Option<i32>,
+    out: String,
+    error: String,
+}
+
+fn cohort(folder: &Path, arguments: &[&str]) -> Said {
+    let output = espalier(folder, &[&["cohort"], arguments, QUICK.as_slice()].concat());
+    let out = String::from_utf8_lossy(&output.stdout).into_owned();
+    Said { code: output.status.code(), out, error: stderr(&output) }
+}
+
+/// The rows of a table without its heading.
+fn rows(path: &Path) -> Vec<Vec<String>> {
+    let text = fs::read_to_string(path).expect("a table");
+    text.lines().skip(1).map(|line| line.split('\t').map(str::to_owned).collect()).collect()
+}
+
+fn verdicts(folder: &Path) -> Vec<(String, String)> {
+    rows(&folder.join("out/group/group.tsv")).iter().map(|row| (row[0].clone(), row[1].clone())).collect()
+}
+
+fn list(folder: &Path, more: &[&str]) -> Vec<Value> {
+    let said = cohort(folder, &[&["data/samples.tsv", "-o", "out", "--list"], more].concat());
+    assert_eq!(said.code, Some(0), "{}", said.error);
+    let list: Value = serde_json::from_str(&said.out).expect("JSON");
+    list["samples"].as_array().expect("samples").clone()
+}
+
+#[test]
+fn a_scan_that_fails_stops_no_other() {
+    let folder = data();
+    let at = folder.path();
+    let call = ["data/samples.tsv", "-o", "out"];
+    let first = cohort(at, &call);
+    assert_eq!(first.code, Some(74), "{}", first.error);
+    assert!(first.error.contains("error[E-COHORT-FAILED]: 2 of 4 scans failed; the first: b (E-IO-READ)"));
+    assert!(first.out.contains("4 runs, 2 certified, 2 without a map"), "{}", first.out);
+    let expected = [("a", "certified"), ("b", "failed"), ("c", "failed"), ("d", "certified")];
+    assert_eq!(verdicts(at), expected.map(|(id, verdict)| (id.to_owned(), verdict.to_owned())));
+    let failures = rows(&at.join("out/failures.tsv"));
+    let told = |row: &[String]| (row[0].clone(), row[1].clone(), row[3].clone());
+    assert_eq!(told(&failures[0]), ("b".to_owned(), "E-IO-READ".to_owned(), "n/a".to_owned()));
+    assert_eq!(failures[0][2], "a file cannot be read");
+    assert!(failures[1][1].starts_with("E-TREE") && failures[1][2].starts_with("tree: "), "{failures:?}");
+    assert_eq!(failures[1][3], "radius");
+
+    // The same command looks at what is done, and does the rest.
+    let second = cohort(at, &call);
+    assert_eq!(
+        (second.code, second.error.matches("embed        kept").count()),
+        (Some(74), 2),
+        "{}",
+        second.error
+    );
+    assert_eq!(second.error.matches(" s  ").count(), 0, "{}", second.error);
+    // What the list says is what there is to do.
+    fs::write(at.join("data/lost.swc"), fork(40.0)).expect("writable");
+    let retry: Vec<&str> = failures[0][4].split(' ').skip(1).collect();
+    assert_eq!(retry[..5], ["cohort", "data/samples.tsv", "-o", "out", "--set"]);
+    let again = espalier(at, &retry);
+    assert!(again.status.success(), "{}", stderr(&again));
+    let page = cohort(at, &[&call[..], &["--group"]].concat());
+    assert_eq!(page.code, Some(0), "{}", page.error);
+    assert!(page.out.contains("4 runs, 3 certified, 1 without a map"), "{}", page.out);
+    assert_eq!(rows(&at.join("out/failures.tsv")).len(), 1);
+}
+
+#[test]
+fn older_results_are_not_taken_for_new_ones() {
+    let folder = data();
+    let at = folder.path();
+    let only = |id: &str, more: &[&str]| {
+        cohort(at, &[&["data/samples.tsv", "-o", "out", "--only", id], more].concat())
+    };
+    assert_eq!(only("a,d", &[]).code, Some(0));
+    let is_done = |more: &[&str]| {
+        list(at, more).iter().map(|sample| sample["done"] == Value::Bool(true)).collect::<Vec<_>>()
+    };
+    assert_eq!(is_done(&[]), [true, false, false, true]);
+    assert_eq!(is_done(&["--set", "embed.w_angle=7"]), [false; 4]);
+    // The scan is damaged afterwards: its map is not that of the scan.
+    fs::write(at.join("data/one.swc"), "1 1 0 0\n").expect("writable");
+    let refused = only("a", &[]);
+    assert_eq!(refused.code, Some(3), "{}", refused.error);
+    assert!(at.join("out/runs/a/embedding.json").exists());
+    let page = cohort(at, &["data/samples.tsv", "-o", "out", "--group"]);
+    assert_eq!(page.code, Some(0), "{}", page.error);
+    let failures = rows(&at.join("out/failures.tsv"));
+    assert_eq!(failures.iter().map(|row| row[0].as_str()).collect::<Vec<_>>(), ["a", "b", "c"]);
+    assert!(failures[0][1].starts_with("E-SWC"), "{failures:?}");
+    assert_eq!((failures[1][1].as_str(), failures[1][2].contains("never run")), ("E-GROUP-NO-RUN", true));
+    // A page over folders sees the note as well.
+    assert_eq!(espalier(at, &["group", "out/runs", "-o", "page"]).status.code(), Some(0));
+    assert_eq!(rows(&at.join("page/group.tsv"))[0][1], "failed");
+    // Asked for with other settings, nothing is done any more.
+    let page = cohort(at, &["data/samples.tsv", "-o", "out", "--group", "--set", "seed=9"]);
+    assert!(page.out.contains("4 runs, 0 certified, 4 without a map"), "{}", page.out);
+    assert!(
+        page.out.contains("d  E-GROUP-UNFINISHED  done before, but not with these settings"),
+        "{}",
+        page.out
+    );
+}
+
+#[test]
+fn a_list_says_what_each_scan_depends_on() {
+    let folder = data();
+    let at = folder.path();
+    fs::write(at.join("data/quick.toml"), "schema = 1\n[embed]\nw_angle = 7.0\n").expect("writable");
+    let before = list(at, &["--config", "data/quick.toml"]);
+    let files = |sample: &Value| sample["files"].as_array().expect("files").len();
+    assert_eq!(before.iter().map(files).collect::<Vec<_>>(), [2, 1, 2, 2]);
+    assert_eq!(before[0]["done_file"], "out/runs/a/provenance/sample.json");
+    let text = fs::read_to_string(at.join("data/samples.tsv")).expect("a table");
+    fs::write(at.join("data/samples.tsv"), text.replace("two.swc", "one.swc")).expect("writable");
+    let after = list(at, &["--config", "data/quick.toml"]);
+    let settings = |list: &[Value]| list.iter().map(|sample| sample["settings"].clone()).collect::<Vec<_>>();
+    assert_eq!(settings(&before)[..3], settings(&after)[..3]);
+    assert_ne!(before[3]["settings"], after[3]["settings"]);
+    assert_ne!(settings(&before)[0], list(at, &[])[0]["settings"]);
+    assert!(!at.join("out").exists(), "a list writes nothing");
+}
+
+#[test]
+fn a_table_that_cannot_be_used_is_refused_whole() {
+    let folder = data();
+    let at = folder.path();
+    for (table, parts) in [
+        ("id\tpath\tlable\na\tx.swc\t3\n", vec!["line 1: unknown column lable; did you mean label?"]),
+        (
+            "id\tpath\tembed.w_angel\tconfig\na\tone.swc\t3\t\nb\tone.swc\t\tnone.toml\n",
+            vec!["line 2: a: ", "embed.w_angel", "line 3: b: cannot read data/none.toml"],
+        ),
+        ("id\tpath\tembed.w_angle\na\tone.swc\t-3\na\tone.swc\t\n", vec!["line 3: id a is that of line 2"]),
+        ("id\tpath\tpreset\na\tone.swc\tliver\n", vec!["line 2: a: ", "preset"]),
+        ("id\tpath\na\t$ESPALIER_DATA/x.nii\n", vec!["ESPALIER_DATA is not set"]),
+    ] {
+        fs::write(at.join("data/samples.tsv"), table).expect("writable");
+        let said = cohort(at, &["data/samples.tsv", "-o", "out"]);
+        assert_eq!(said.code, Some(2), "{table}: {}", said.error);
+        assert!(said.error.contains("error[E-COHORT-TABLE]: data/samples.tsv: "), "{}", said.error);
+        for part in parts {
+            assert!(said.error.contains(part), "no {part:?} in {}", said.error);
+        }
+    }
+    assert_eq!(cohort(at, &["data/none.tsv"]).code, Some(74));
+    fs::write(at.join("data/samples.tsv"), "id\tpath\na\tone.swc\n").expect("writable");
+    let said = cohort(at, &["data/samples.tsv", "-o", "out", "--only", "z"]);
+    assert_eq!(
+        (said.code, said.error.contains("error[E-COHORT-NO-SCAN]: there is no scan z")),
+        (Some(2), true)
+    );
+    assert!(!at.join("out").exists());
+}
+
+#[test]
+fn no_path_of_the_machine_is_on_the_page() {
+    let folder = data();
+    let at = folder.path();
+    let (table, out) = (at.join("data/samples.tsv"), at.join("out"));
+    let call = [table.to_str().expect("UTF-8"), "-o", out.to_str().expect("UTF-8"), "--anonymous"];
+    assert_eq!(cohort(at, &call).code, Some(74));
+    let named = cohort(at, &[&call[..3], &["--group"]].concat());
+    assert_eq!(named.code, Some(0));
+    let page = fs::read_to_string(out.join("group/group.html")).expect("a page");
+    assert!(page.contains("espalier cohort samples.tsv -o out "), "the command as a page may show it");
+    for file in ["group.html", "group.json", "group.tsv"] {
+        let text = fs::read_to_string(out.join("group").join(file)).expect("a file");
+        assert!(!text.contains(&at.display().to_string()), "{file}");
+    }
+    assert!(rows(&out.join("failures.tsv"))[0][4].contains(&table.display().to_string()));
+}
+
+/// What pipelines/cohort calls is what there is; whether Snakemake runs it, `scripts/cohort` tells.
+#[test]
+fn the_snakefile_asks_for_what_there_is() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let snakefile = fs::read_to_string(root.join("pipelines/cohort/Snakefile")).expect("a Snakefile");
+    let help = espalier(&root, &["cohort", "--help"]);
+    let help = String::from_utf8_lossy(&help.stdout).into_owned();
+    let calls: Vec<&str> = snakefile.lines().filter(|line| line.contains("COHORT}")).collect();
+    let words = calls.iter().flat_map(|line| line.split_whitespace());
+    let options: Vec<&str> =
+        words.map(|word| word.trim_matches(['"', ',', ')'])).filter(|word| word.starts_with("--")).collect();
+    assert!(options.len() >= 5, "{options:?}");
+    for option in options {
+        assert!(help.contains(option), "{option}");
+    }
+    let config = fs::read_to_string(root.join("pipelines/cohort/config.yaml")).expect("a config");
+    let keys: Vec<&str> =
+        config.lines().filter_map(|line| line.split_once(':')).map(|(key, _)| key).collect();
+    for key in snakefile
+        .split("config['")
+        .chain(snakefile.split("config[\""))
+        .filter_map(|rest| rest.split(['\'', '"']).next())
+    {
+        let is_key = key.chars().all(|c| c.is_ascii_lowercase() || c == '_');
+        assert!(!is_key || keys.contains(&key), "{key}");
+    }
+    let out = tempfile::tempdir().expect("temporary folder");
+    let out = out.path().to_str().expect("UTF-8");
+    let listed = espalier(&root, &["cohort", "pipelines/cohort/samples.tsv", "-o", out, "--list"]);
+    let list: Value = serde_json::from_slice(&listed.stdout).expect("JSON");
+    assert_eq!(list["samples"].as_array().map(Vec::len), Some(3), "{}", stderr(&listed));
+    for key in ["id", "files", "settings", "done_file"] {
+        assert!(list["samples"][0].get(key).is_some(), "{key}");
+    }
+    assert!(snakefile.contains("/provenance/sample.json"), "the file that says that a scan is done");
+}
