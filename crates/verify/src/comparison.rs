@@ -20,8 +20,9 @@ use crate::weights::NodeWeights;
 
 /// Share by which an energy may be off.
 const ROUNDING: f64 = 1e-9;
-/// The same of the end of a convergence curve, which was taken before coordinates were rounded.
-const TRACE_ROUNDING: f64 = 1e-6;
+/// The same of the end of a convergence curve, which was taken before coordinates were rounded: edges a millionth as long as
+/// the tree turn by up to this much.
+const TRACE_ROUNDING: f64 = 1e-5;
 
 /// Checks every layout of a comparison.
 ///
