@@ -48,6 +48,9 @@ fn main() -> ExitCode {
 fn all(n: &str, seed: &str, only: Option<&str>) -> Option<bool> {
     let (_, _) = (n.parse::<u32>().ok()?, seed.parse::<u64>().ok()?);
     let names: Vec<&str> = readers().iter().map(|reader| reader.name).collect();
+    if only.is_some_and(|only| !names.contains(&only)) {
+        return None;
+    }
     let left: Mutex<Vec<&str>> =
         Mutex::new(names.into_iter().rev().filter(|name| only.is_none_or(|only| only == *name)).collect());
     let n_failed = Mutex::new(0);

@@ -137,16 +137,9 @@ fn runs_that_share_at_the_same_time_agree() {
             runs.into_iter().map(|run| run.join().expect("a thread")).collect()
         });
         assert!(digests.iter().all(|digest| *digest == digests[0]), "{digests:?}");
-        let stored: u64 =
-            files_below(&cache.folder.join("espalier-cache-1/objects")).iter().map(|path| size(path)).sum();
-        // The last run to end may not have had the store alone.
         let next = run_sharing(&neuron(), &folder.path().join(format!("{max_bytes}")), &quick(), &cache);
-        assert!(next.is_ok_and(|(summary, ..)| summary.digest == digests[0]), "{stored} bytes were stored");
+        assert!(next.is_ok_and(|(summary, ..)| summary.digest == digests[0]));
     }
-}
-
-fn size(path: &Path) -> u64 {
-    fs::metadata(path).map_or(0, |metadata| metadata.len())
 }
 
 #[test]

@@ -222,12 +222,20 @@ fn what_cannot_be_read_is_said_so() {
     let other = tampered(original.path(), "tree.swc", true, tree);
     assert!(failures(other.path()).contains(&"embedding.json: tree".to_owned()));
 
-    for file in ["nodes.tsv", "SHA256SUMS", "tree.swc"] {
+    let absent =
+        [("nodes.tsv", Class::Uncertified), ("tree.swc", Class::Uncertified), ("SHA256SUMS", Class::Io)];
+    for (file, expected) in absent {
         let copy = tempfile::tempdir().expect("temporary folder");
         copy_folder(original.path(), copy.path());
         fs::remove_file(copy.path().join(file)).expect("remove");
-        assert_eq!(class(copy.path()), Class::Io, "{file}");
+        assert_eq!(class(copy.path()), expected, "{file}");
     }
+    // A result that no line speaks of is one that anybody may have altered.
+    let without = |text: &str| {
+        text.lines().filter(|line| !line.ends_with("  planar.png")).collect::<Vec<_>>().join("\n")
+    };
+    let unsealed = tampered(original.path(), "SHA256SUMS", false, without);
+    assert_eq!(failures(unsealed.path()), ["planar.png: sealed"]);
     let sums = tampered(original.path(), "SHA256SUMS", false, |text| format!("{text}no digest\n"));
     assert_eq!(class(sums.path()), Class::Input);
     assert!(matches!(verify(&PathBuf::from("no/such/folder"), None), Err(Error::Read { .. })));

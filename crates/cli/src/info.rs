@@ -13,7 +13,7 @@ struct Here {
     info: Info,
     /// How many threads it works with; no result depends on it.
     threads: usize,
-    /// The most memory that reading a file may take, in bytes.
+    /// The most memory that a stage may take, in bytes.
     max_memory_bytes: u64,
 }
 
@@ -37,10 +37,7 @@ fn page(here: &Here) -> String {
         format!("espalier {}", info.version),
         format!("target     {} {}{kind}, features: {}", target.arch, target.os, listed(&target.features)),
         format!("threads    {threads} (no result depends on it)"),
-        format!(
-            "memory     {:.1} GiB at most for reading a file",
-            *max_memory_bytes as f64 / f64::from(1 << 30)
-        ),
+        format!("memory     {:.1} GiB at most for a stage", *max_memory_bytes as f64 / f64::from(1 << 30)),
         format!("config     schema {}", info.config_schema),
         String::new(),
         "stages     version of what they make".to_owned(),

@@ -11,8 +11,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// Prints a line to standard error. A closed standard error is no reason to stop. A message quotes files and their names:
 /// what in them would drive a terminal is shown as a sign of replacement.
 pub(crate) fn line(text: &str) {
-    let drives = |letter: char| letter.is_control() && !matches!(letter, '\n' | '\t');
-    let _ = writeln!(std::io::stderr(), "{}", text.replace(drives, "\u{FFFD}"));
+    let _ = writeln!(std::io::stderr(), "{}", harmless(text));
+}
+
+fn harmless(text: &str) -> String {
+    text.replace(|letter: char| letter.is_control() && !matches!(letter, '\n' | '\r' | '\t'), "\u{FFFD}")
 }
 
 /// Whether a line of results was lost.
@@ -20,7 +23,7 @@ static IS_RESULT_LOST: AtomicBool = AtomicBool::new(false);
 
 /// Prints a line to standard output. A reader that has had enough (`| head`) is no reason to stop.
 pub(crate) fn result(text: &str) {
-    match writeln!(std::io::stdout(), "{text}") {
+    match writeln!(std::io::stdout(), "{}", harmless(text)) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
             line(&format!("error: cannot print results: {error}"));
             IS_RESULT_LOST.store(true, Ordering::Relaxed);

@@ -158,10 +158,11 @@ fn what_is_not_clear_is_refused() {
     let filter = ["in", "out", "group", "--filter", "desc=other"];
     refused(&filter, 74, "suffix any, desc-other");
     refused(&["in", "in", "participant", "--suffix", "mask"], 73, "error[E-BIDS-OUTPUT]: in holds");
+    refused(&["none", "out", "participant"], 74, "cannot read none");
     refused(
-        &["none", "out", "participant"],
+        &["in/sub-01", "out", "participant"],
         3,
-        "error[E-BIDS-DATASET]: none/dataset_description.json: there is no such file",
+        "error[E-BIDS-DATASET]: in/sub-01/dataset_description.json: there is no such file",
     );
     refused(&["none", "out", "participant", "--skip-bids-validation"], 74, "cannot read none");
     assert!(!at.join("out").exists());

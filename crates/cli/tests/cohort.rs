@@ -108,6 +108,11 @@ fn a_scan_that_fails_stops_no_other() {
     assert_eq!(page.code, Some(0), "{}", page.error);
     assert!(page.out.contains("4 runs, 3 certified, 1 without a map"), "{}", page.out);
     assert_eq!(rows(&at.join("out/failures.tsv")).len(), 1);
+
+    // Other results in the folder of a scan are not the ones that it was done with.
+    fs::write(at.join("out/runs/a/SHA256SUMS"), "others").expect("writable");
+    let page = cohort(at, &[&call[..], &["--group"]].concat());
+    assert!(page.out.contains("4 runs, 2 certified, 2 without a map"), "{}", page.out);
 }
 
 #[test]
@@ -170,6 +175,7 @@ fn a_list_says_what_each_scan_depends_on() {
 fn a_table_that_cannot_be_used_is_refused_whole() {
     let folder = data();
     let at = folder.path();
+    fs::write(at.join("data/config.txt"), "bogus = 1\n").expect("writable");
     for (table, parts) in [
         ("id\tpath\tlable\na\tx.swc\t3\n", vec!["line 1: unknown column lable; did you mean label?"]),
         (
@@ -179,6 +185,7 @@ fn a_table_that_cannot_be_used_is_refused_whole() {
         ("id\tpath\tembed.w_angle\na\tone.swc\t-3\na\tone.swc\t\n", vec!["line 3: id a is that of line 2"]),
         ("id\tpath\tpreset\na\tone.swc\tliver\n", vec!["line 2: a: ", "preset"]),
         ("id\tpath\na\t$ESPALIER_DATA/x.nii\n", vec!["ESPALIER_DATA is not set"]),
+        ("id\tpath\tconfig\na\tone.swc\tconfig.txt\n", vec!["line 2: a: ", "bogus"]),
     ] {
         fs::write(at.join("data/samples.tsv"), table).expect("writable");
         let said = cohort(at, &["data/samples.tsv", "-o", "out"]);
@@ -205,6 +212,13 @@ fn no_path_of_the_machine_is_on_the_page() {
     let (table, out) = (at.join("data/samples.tsv"), at.join("out"));
     let call = [table.to_str().expect("UTF-8"), "-o", out.to_str().expect("UTF-8"), "--anonymous"];
     assert_eq!(cohort(at, &call).code, Some(74));
+    for file in ["group.html", "group.json", "group.tsv"] {
+        let text = fs::read_to_string(out.join("group").join(file)).expect("a file");
+        assert!(
+            !text.contains("espalier run") && !text.contains("espalier cohort"),
+            "{file}: a command has the scan's name"
+        );
+    }
     let named = cohort(at, &[&call[..3], &["--group"]].concat());
     assert_eq!(named.code, Some(0));
     let page = fs::read_to_string(out.join("group/group.html")).expect("a page");

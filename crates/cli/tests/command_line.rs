@@ -287,7 +287,7 @@ fn verify_prints_a_table_and_fails_where_a_claim_does() {
     assert_eq!(output.status.code(), Some(8), "{json}");
     assert!(json.contains("\"holds\": false") && stderr(&output).contains("error[E-VERIFY]"), "{json}");
     fs::remove_file(folder.path().join("out/nodes.tsv")).expect("remove");
-    refused(&folder, &["verify", "out"], 74, &["nodes.tsv"]);
+    refused(&folder, &["verify", "out"], 8, &["error[E-VERIFY]"]);
     fs::write(folder.path().join("out/SHA256SUMS"), "no digest\n").expect("write");
     refused(&folder, &["verify", "out"], 3, &["error[E-VERIFY-MALFORMED]", "SHA256SUMS", "line 1"]);
     refused(&folder, &["verify", "nowhere"], 74, &["SHA256SUMS"]);

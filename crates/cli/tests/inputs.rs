@@ -169,3 +169,16 @@ fn a_tracing_of_no_neurons_size_is_told() {
     assert!(warns(tracing(9000.0, 40.0), &[]), "voxels of 8 nm");
     assert!(!warns(tracing(9000.0, 40.0), &["--set", "input.unit=nm", "--set", "input.scale=[8,8,8]"]));
 }
+
+#[test]
+fn no_result_takes_the_place_of_the_input() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let swc = "1 1 0 0 0 1 -1\n2 3 100 0 0 1 1\n";
+    fs::create_dir(folder.path().join("own")).expect("folder");
+    fs::write(folder.path().join("own/tree.swc"), swc).expect("write");
+    let (code, text) = said(&folder, &["tree", "own/tree.swc", "-o", "own"]);
+    assert_eq!(code, Some(2), "{text}");
+    assert!(text.contains("error[E-RUN-INPUT-IN-WAY]: own/tree.swc"), "{text}");
+    assert_eq!(read(&folder, "own/tree.swc"), swc);
+    assert_eq!(said(&folder, &["tree", "own/tree.swc", "-o", "other"]).0, Some(0));
+}

@@ -228,6 +228,12 @@ pub enum Error {
         /// The file asked for.
         path: PathBuf,
     },
+    /// An input that a result would be written over.
+    #[error("{path} is the input, and a result of that name would take its place", path = path.display())]
+    InputInTheWay {
+        /// The input.
+        path: PathBuf,
+    },
     /// A text that is no point.
     #[error("{source_name}{cause}", source_name = source_name.as_ref().map(|name| format!("{name}: ")).unwrap_or_default())]
     Point {
@@ -420,6 +426,7 @@ impl Diagnose for Error {
             Self::MissingArtifact { .. } => "E-RUN-MISSING-FILE",
             Self::NoSuchPlace { .. } => "E-PROFILE-PLACE",
             Self::PlotFormat { .. } | Self::ResultInTheWay { .. } => "E-PROFILE-PLOT",
+            Self::InputInTheWay { .. } => "E-RUN-INPUT-IN-WAY",
             Self::Point { cause, .. } => cause.code(),
             Self::NoSuchSpace { .. } => "E-LOCATE-SPACE",
             Self::NoRun { .. } => "E-COMPARE-NO-RUN",
@@ -470,6 +477,7 @@ impl Diagnose for Error {
             | Self::NoSuchPlace { .. }
             | Self::PlotFormat { .. }
             | Self::ResultInTheWay { .. }
+            | Self::InputInTheWay { .. }
             | Self::NoSuchSpace { .. }
             | Self::EmptyRange { .. }
             | Self::Input { .. }
@@ -508,6 +516,7 @@ impl Diagnose for Error {
             Self::NoSuchPlace { .. } => "branches.tsv has the branches, nodes.tsv the nodes".to_owned(),
             Self::PlotFormat { .. } => "name it with one of these endings".to_owned(),
             Self::ResultInTheWay { .. } => "choose another name for the plot".to_owned(),
+            Self::InputInTheWay { .. } => "choose another folder with -o".to_owned(),
             Self::Point { cause, .. } => cause.hint(),
             Self::NoSuchSpace { .. } => "give points in RAS+ mm, with --lps in LPS+ mm, or on the map in mm".to_owned(),
             Self::NoRun { .. } => "run it with this version, at least up to --to embed".to_owned(),

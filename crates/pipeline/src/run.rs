@@ -170,6 +170,10 @@ pub struct Plan {
 /// # Errors
 /// [`Error`], as the run itself would before its first stage.
 pub fn plan(request: &Request) -> Result<Vec<Plan>, Error> {
+    in_pool(request.threads, || planned(request))
+}
+
+fn planned(request: &Request) -> Result<Vec<Plan>, Error> {
     let (mut run, stages) = prepare(request, &|_| {})?;
     let folder = RunFolder::to_read(&request.out);
     let settings = Settings::open(&folder, &request.loaded.config);
@@ -278,7 +282,23 @@ impl Run<'_> {
     fn take_stock_of_input(&mut self, stages: &[Stage]) -> Result<(), Error> {
         let (Some(input), Some(&first)) = (&self.input, stages.first()) else { return Ok(()) };
         let files = input_files(&self.source, &self.artifacts, (first, input))?;
+        self.refuse_own_input(&files, stages)?;
         self.input_rows = Some(provenance::input_rows(&files)?);
+        Ok(())
+    }
+
+    /// No result may take the place of what it is made from.
+    fn refuse_own_input(&self, files: &[PathBuf], stages: &[Stage]) -> Result<(), Error> {
+        let Ok(out) = std::fs::canonicalize(&self.request.out) else { return Ok(()) };
+        for path in files {
+            let place = std::fs::canonicalize(path).ok();
+            let name = place.as_ref().and_then(|place| place.strip_prefix(&out).ok()?.to_str());
+            let is_written =
+                |name: &str| stages.iter().any(|stage| stage.writes().iter().any(|own| own == name));
+            if name.is_some_and(is_written) {
+                return Err(Error::InputInTheWay { path: path.clone() });
+            }
+        }
         Ok(())
     }
 
@@ -405,6 +425,7 @@ impl Run<'_> {
             Ok(()) => self.has_stored = true,
             Err(error) if !self.is_store_lost => {
                 self.is_store_lost = true;
+                self.n_warnings += 1;
                 let message = format!("results are not shared: {error}");
                 (self.events)(Event::Warning { stage, code: "W-RUN-CACHE".to_owned(), message });
             }

@@ -5,7 +5,7 @@ use std::path::{Component, Path};
 /// A text as one word of a POSIX shell.
 pub(crate) fn word(text: &str) -> String {
     let is_plain = text.chars().all(|c| c.is_ascii_alphanumeric() || "._-/=,:+@".contains(c));
-    let is_plain = is_plain && !text.starts_with(['-', '=']) && !text.is_empty();
+    let is_plain = is_plain && !text.starts_with('=') && !text.is_empty();
     if is_plain { text.to_owned() } else { format!("'{}'", text.replace('\'', "'\\''")) }
 }
 
@@ -27,7 +27,7 @@ mod tests {
         assert_eq!(word("embed.w_angle=3"), "embed.w_angle=3");
         assert_eq!(word("a b"), "'a b'");
         assert_eq!(word("it's"), "'it'\\''s'");
-        assert_eq!((word(""), word("-x"), word("$HOME")), ("''".into(), "'-x'".into(), "'$HOME'".into()));
+        assert_eq!((word(""), word("--set"), word("$HOME")), ("''".into(), "--set".into(), "'$HOME'".into()));
     }
 
     #[test]

@@ -115,9 +115,9 @@ impl Stage {
     /// the code before made.
     pub(crate) fn version(self) -> u32 {
         match self {
-            Self::Phantom | Self::Skeleton | Self::Views => 1,
-            Self::Volume | Self::Radius | Self::Tree | Self::Render | Self::Report => 2,
-            Self::Embed => 3,
+            Self::Phantom | Self::Views => 1,
+            Self::Skeleton | Self::Radius | Self::Tree | Self::Render => 2,
+            Self::Volume | Self::Embed | Self::Report => 3,
         }
     }
 

@@ -1,10 +1,11 @@
 //! A run folder held against itself: digests, formats, and every number computed again.
 //!
 //! **Input** a run folder that is done with its embed stage. **Output** one check per claim, by file.
-//! **Steps** 1. `SHA256SUMS`: each file in it is there and is what it was, and what is read below is in it. 2. Read
+//! **Steps** 1. `SHA256SUMS`: each file in it is there and is what it was, and what is read below or was made by a stage is in it. 2. Read
 //! what the checks need, as strangers' files. 3. `espalier_verify` on what was read.
 //! **Guarantees** nothing is written, nothing is locked, nothing is taken over from the code that made the results.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
@@ -20,9 +21,10 @@ use thiserror::Error as ThisError;
 
 use crate::config::Config;
 use crate::error::Error;
-use crate::folder::{file_digest, hex_digest};
+use crate::folder::{file_digest, hex_digest, is_absent};
+use crate::record::Record;
 use crate::run;
-use crate::stage::Artifact;
+use crate::stage::{Artifact, Stage};
 
 const SUMS: &str = "SHA256SUMS";
 const CONFIG: &str = "provenance/config.resolved.toml";
@@ -153,10 +155,8 @@ pub fn verify(folder: &Path, threads: Option<usize>) -> Result<Verification, Err
         }) {
             Ok(contents) => checks.extend(contents),
             // What was altered since may well be unreadable; that it was altered is the finding.
-            Err(Error::File { path, cause }) if is_altered => {
-                let file = path.strip_prefix(folder.0).unwrap_or(&path).display().to_string();
-                checks.push((file, Check::unless("readable", "yes", Some(cause.to_string()))));
-            }
+            Err(Error::File { path, cause }) if is_altered => checks.push(folder.unreadable(&path, &cause)),
+            Err(Error::Read { path, source }) if is_altered => checks.push(folder.unreadable(&path, &source)),
             Err(error) => return Err(error),
         }
         Ok(Verification { folder: folder.0.to_owned(), checks, digest })
@@ -176,6 +176,11 @@ impl Folder<'_> {
         String::from_utf8(bytes).map_err(|error| self.malformed(file, error.utf8_error().into()))
     }
 
+    fn unreadable(&self, path: &Path, cause: &dyn std::fmt::Display) -> (String, Check) {
+        let file = path.strip_prefix(self.0).unwrap_or(path).display().to_string();
+        (file, Check::unless("readable", "yes", Some(cause.to_string())))
+    }
+
     fn malformed(&self, file: &str, cause: Malformed) -> Error {
         Error::file(&self.0.join(file), cause)
     }
@@ -189,18 +194,34 @@ impl Folder<'_> {
                 self.malformed(SUMS, Malformed::Sums { line: idx + 1, text: line.chars().take(80).collect() })
             })?;
             let path = self.0.join(file);
-            let (_, found) = file_digest(&path).map_err(|source| Error::Read { path, source })?;
+            let found = match file_digest(&path) {
+                Ok((_, found)) => found,
+                Err(source) if is_absent(&source) => "no such file".to_owned(),
+                Err(source) => return Err(Error::Read { path, source }),
+            };
             checks.push((file.to_owned(), Check::same("sha256", digest, found)));
         }
-        for file in
-            CHECKED.map(|artifact| artifact.file()).into_iter().chain([NODES, COMPARE, DICTIONARY, CONFIG])
-        {
-            if !checks.iter().any(|(listed, _)| listed == file) {
+        let checked =
+            CHECKED.map(|artifact| artifact.file()).into_iter().chain([NODES, COMPARE, DICTIONARY, CONFIG]);
+        let mut expected: BTreeSet<String> = checked.map(str::to_owned).collect();
+        expected.extend(self.made_by_stages());
+        for file in expected {
+            if !checks.iter().any(|(listed, _)| *listed == file) {
                 let fault = Some("no line in SHA256SUMS".to_owned());
-                checks.push((file.to_owned(), Check::unless("sealed", "yes", fault)));
+                checks.push((file, Check::unless("sealed", "yes", fault)));
             }
         }
         Ok((checks, hex_digest(text.as_bytes())))
+    }
+
+    /// What the records of the stages name, and the records.
+    fn made_by_stages(&self) -> Vec<String> {
+        let made = |stage: Stage| {
+            let record_file = Record::file_of(stage);
+            let record = Record::parsed(stage, &self.bytes(&record_file).ok()?)?;
+            Some(record.files().keys().cloned().chain([record_file]).collect::<Vec<_>>())
+        };
+        Stage::ALL.into_iter().filter_map(made).flatten().collect()
     }
 
     /// Everything that can be computed again.

@@ -10,6 +10,7 @@ pub(crate) fn espalier(folder: &Path, arguments: &[&str]) -> Output {
         .args(arguments)
         .current_dir(folder)
         .env_remove("ESPALIER_DATA")
+        .env_remove("ESPALIER_CACHE")
         .output()
         .expect("the program starts")
 }

@@ -22,6 +22,7 @@ const MAX_BYTES: u64 = 4 << 20;
 
 /// Checks that a folder describes itself as BIDS has it.
 pub(super) fn check(root: &Path) -> Result<(), Error> {
+    fs::read_dir(root).map_err(|source| Error::Read { path: root.to_owned(), source })?;
     let path = root.join(FILE);
     let refused = |problem: &str| Error::BidsDataset { path: path.clone(), problem: problem.to_owned() };
     if !path.is_file() {
@@ -38,8 +39,12 @@ pub(super) fn check(root: &Path) -> Result<(), Error> {
 
 /// Writes the description of our results, made from the data set in `root`.
 pub(super) fn write(root: &Path, out: &Path) -> Result<(), Error> {
-    let place = |path: &Path| fs::canonicalize(path).ok();
-    let is_own_input = place(out).is_some() && place(out) == place(root);
+    let place = |path: &Path| fs::canonicalize(path).or_else(|_| std::path::absolute(path)).ok();
+    let is_subject = |below: &Path| below.to_string_lossy().starts_with("sub-");
+    // Results among the scans of a subject would be taken for scans.
+    let is_own_input = place(out).zip(place(root)).is_some_and(|(out, root)| {
+        out.strip_prefix(root).is_ok_and(|below| below.as_os_str().is_empty() || is_subject(below))
+    });
     let path = out.join(FILE);
     if is_own_input || path.exists() && !read(&path).is_some_and(|description| is_ours(&description)) {
         return Err(Error::BidsOutput { folder: out.to_owned() });

@@ -223,14 +223,18 @@ fn sample(request: &BidsRequest, visit: &Visit, scan: &Scan) -> Result<Sample, E
             let value = toml::Value::from(path.to_string_lossy().into_owned()).to_string();
             let mut overrides = vec![Override { key: "input.path".to_owned(), value }];
             overrides.extend(request.overrides.iter().cloned());
-            Loaded::read(config, &overrides)?
+            Loaded::read_config(config, &overrides)?
         }
     };
     run::source_of(&loaded, request.data_dir.as_deref())?;
     let place = Path::new(&visit.relative()).join(&scan.between).join(&scan.name.stem);
     let (retry, retry_shown) = retries(request, visit);
     Ok(Sample {
-        id: scan.name.stem.clone(),
+        id: if request.skip_validation {
+            place.to_string_lossy().into_owned()
+        } else {
+            scan.name.stem.clone()
+        },
         out: request.out.join(&place),
         loaded,
         config_file: request.config.clone(),

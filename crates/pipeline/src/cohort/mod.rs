@@ -194,7 +194,7 @@ fn sample(request: &CohortRequest, row: &Row) -> Result<Sample, Error> {
     overrides.extend(request.overrides.iter().cloned());
     let written = row.settings.iter().find(|set| set.key == "input.path").map(|set| set.value.clone());
     let loaded = match (&config_file, &written) {
-        (Some(config), _) => Loaded::read(config, &overrides)?,
+        (Some(config), _) => Loaded::read_config(config, &overrides)?,
         (None, path) => Loaded::read(Path::new(&text_of(path.as_deref().unwrap_or_default())), &overrides)?,
     };
     run::source_of(&loaded, request.data_dir.as_deref())?;
@@ -206,13 +206,16 @@ fn sample(request: &CohortRequest, row: &Row) -> Result<Sample, Error> {
 
 /// The value of a setting; a path in the table is relative to the table's folder, whatever config it goes into.
 fn from_folder(base_dir: &Path, set: &Override) -> String {
-    let is_path = set.key == "input.path" || SideFile::ALL.iter().any(|side| side.key() == set.key);
     let text = text_of(&set.value);
-    if !is_path || text.is_empty() || text.starts_with(DATA_VARIABLE) {
+    if !is_path(set) || text.is_empty() || text.starts_with(DATA_VARIABLE) {
         return set.value.clone();
     }
     let path = base_dir.join(text);
     quoted(&std::path::absolute(&path).unwrap_or(path).to_string_lossy())
+}
+
+fn is_path(set: &Override) -> bool {
+    set.key == "input.path" || SideFile::ALL.iter().any(|side| side.key() == set.key)
 }
 
 /// The text in a TOML string; of what is none, as it is.
@@ -239,8 +242,7 @@ fn retries(request: &CohortRequest, id: &str) -> (String, String) {
 /// Settings of the command line as words of a shell; paths among them as they are to be shown.
 pub(crate) fn settings_words(overrides: &[Override], path: &dyn Fn(&Path) -> String) -> Vec<String> {
     let value = |set: &Override| {
-        let is_path = SideFile::ALL.iter().any(|side| side.key() == set.key);
-        if is_path { path(Path::new(&text_of(&set.value))) } else { set.value.clone() }
+        if is_path(set) { path(Path::new(&text_of(&set.value))) } else { set.value.clone() }
     };
     let words = |set: &Override| format!("--set {}", shell::word(&format!("{}={}", set.key, value(set))));
     overrides.iter().map(words).collect()

@@ -89,6 +89,7 @@ impl Sample {
         let provenance = done_file.parent().unwrap_or(&self.out);
         std::fs::create_dir_all(provenance)
             .map_err(|source| Error::Create { path: provenance.to_owned(), source })?;
+        let earlier = std::fs::read(&done_file).ok();
         match std::fs::remove_file(&done_file) {
             Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
                 return Err(Error::Write { path: done_file, source });
@@ -98,8 +99,12 @@ impl Sample {
         let done = run::run(&self.request(effort), events);
         match &done {
             Ok(summary) => folder.write_aside(DONE_FILE, self.done(&summary.digest).as_bytes())?,
-            // Whoever holds the folder will say how it went.
-            Err(Error::Locked { .. }) => {}
+            // Nothing was done, and whoever holds the folder will say how that went.
+            Err(Error::Locked { .. }) => {
+                if let Some(earlier) = earlier.filter(|_| !done_file.exists()) {
+                    folder.write_aside(DONE_FILE, &earlier)?;
+                }
+            }
             Err(error) => failure::note(&folder, error),
         }
         done
@@ -147,16 +152,18 @@ impl Sample {
         hex_digest(format!("{version}\n{versions}{written}\n{beside}{settings}").as_bytes())
     }
 
-    /// Whether it is done, with these settings and this path.
+    /// Whether it is done, with these settings and this path, and nobody has made other results there since.
     #[must_use]
     pub fn is_done(&self) -> bool {
         let text = std::fs::read_to_string(self.done_file()).unwrap_or_default();
-        let done = serde_json::from_str::<Done>(&text).ok();
-        let is_whole = self.out.join("SHA256SUMS").is_file();
-        let is_now = |done: &Done| {
-            done.format == FORMAT && done.version == VERSION && done.settings == self.settings()
-        };
-        is_whole && done.as_ref().is_some_and(is_now)
+        let sums = std::fs::read(self.out.join("SHA256SUMS")).ok();
+        let digest = sums.map(|sums| hex_digest(&sums));
+        serde_json::from_str::<Done>(&text).is_ok_and(|done| {
+            done.format == FORMAT
+                && done.version == VERSION
+                && done.settings == self.settings()
+                && Some(done.digest) == digest
+        })
     }
 
     /// The files that its results are made from, as far as they are there.
@@ -189,7 +196,8 @@ impl Sample {
         }
         let is_noted = failure::read(&self.out).is_some();
         if is_noted || !self.out.join(Artifact::Embedding.file()).exists() {
-            return Some(group::without_map(&self.out, &self.id));
+            // The command that does it again is the cohort's own, and a page without names has none.
+            return Some(Failed { retry: None, ..group::without_map(&self.out, &self.id) });
         }
         Some(Failed {
             code: "E-GROUP-UNFINISHED".to_owned(),

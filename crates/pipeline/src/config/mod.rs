@@ -108,6 +108,14 @@ impl Loaded {
         if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
             return Ok(Self { config: Config::for_input(path, overrides)?, base_dir: PathBuf::new() });
         }
+        Self::read_config(path, overrides)
+    }
+
+    /// Reads a config file, whatever its name.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub(crate) fn read_config(path: &Path, overrides: &[Override]) -> Result<Self, Error> {
         let read = |source| Error::Read { path: path.to_owned(), source };
         let needed = std::fs::metadata(path).map_err(read)?.len();
         if needed > MAX_CONFIG_BYTES {

@@ -19,6 +19,7 @@ use crate::config::{Loaded, Override, Source};
 use crate::error::Error;
 use crate::estimate::{self, Cost, Sizes};
 use crate::run::{self, Request};
+use crate::shell;
 use crate::stage::Stage;
 
 /// An input to be examined.
@@ -126,8 +127,18 @@ fn examine(request: &DoctorRequest, run: &Request) -> Result<Examined, Error> {
     let costs = found.sizes.map(|sizes| costs(run, &run::stages_of(&source), sizes)).unwrap_or_default();
     let input = request.config_or_input.clone();
     let start = ["run".to_owned(), input.display().to_string()];
-    let command =
-        |rest: Vec<&str>| start.iter().cloned().chain(rest.into_iter().map(str::to_owned)).collect();
+    // What was said here has to be said there too.
+    let settings =
+        request.overrides.iter().flat_map(|set| ["--set".to_owned(), format!("{}={}", set.key, set.value)]);
+    let settings: Vec<String> = settings.collect();
+    let command = |rest: Vec<&str>| {
+        start
+            .iter()
+            .cloned()
+            .chain(settings.iter().cloned())
+            .chain(rest.into_iter().map(str::to_owned))
+            .collect()
+    };
     let mut examined = Examined {
         commands: found.commands.into_iter().map(command).collect(),
         input,
@@ -241,7 +252,8 @@ impl Examined {
             }
         }
         for command in &self.commands {
-            text += &format!("  try: espalier {}\n", quoted(command));
+            let words: Vec<String> = command.iter().map(|word| shell::word(word)).collect();
+            text += &format!("  try: espalier {}\n", words.join(" "));
         }
         text + &self.costs_text(threads)
     }
@@ -271,18 +283,6 @@ pub fn costs_table(costs: &[(Stage, Cost)]) -> String {
     costs.iter().map(row).collect()
 }
 
-/// A command as a shell takes it.
-fn quoted(words: &[String]) -> String {
-    let is_plain = |word: &str| {
-        !word.is_empty()
-            && word.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_./=+,:@%".contains(&byte))
-    };
-    let quote = |word: &String| {
-        if is_plain(word) { word.clone() } else { format!("'{}'", word.replace('\'', "'\\''")) }
-    };
-    words.iter().map(quote).collect::<Vec<_>>().join(" ")
-}
-
 fn readable_seconds(seconds: f64) -> String {
     match seconds {
         s if s < 10.0 => format!("{s:.1} s"),
@@ -300,12 +300,6 @@ fn readable_bytes(bytes: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn words_with_blanks_are_quoted() {
-        let words = ["run", "a b.nii", "it's"].map(str::to_owned);
-        assert_eq!(quoted(&words), "run 'a b.nii' 'it'\\''s'");
-    }
 
     #[test]
     fn readable() {

@@ -11,7 +11,7 @@ use super::Findings;
 use crate::artifacts::Lookup;
 use crate::config::Source;
 use crate::error::Error;
-use crate::estimate::Sizes;
+use crate::estimate::{self, Sizes};
 use crate::folder::RunFolder;
 use crate::run::{self, Request, boxed};
 use crate::stage::Stage;
@@ -60,10 +60,7 @@ fn several_series(error: espalier_volume::Error) -> Result<Findings, Error> {
     let mut found = Findings::default();
     found.fact("format", "DICOM", format!("a folder of {} DICOM series", series.len()));
     let listed: Vec<String> = series.iter().map(ToString::to_string).collect();
-    for line in &listed {
-        found.fact("series", line.as_str(), line.as_str());
-    }
-    // The one with the most images is the likeliest.
+    found.fact("series", listed.clone(), listed.join(&format!("\n  {:22}", "")));
     found.advise(
         "E-DICOM-SERIES",
         "which series is meant is not said",
@@ -237,7 +234,11 @@ fn sizes_of_mask(run: &Request) -> Result<Sizes, Error> {
     let nowhere = RunFolder::to_read(Path::new(""));
     let lookup = Lookup { folder: &nowhere, stage: Stage::Volume };
     let mask = artifacts.segmented(lookup, &run.loaded.config.volume)?.mask;
+    let sizes = Sizes::of_mask(&mask);
+    if estimate::cost(Stage::Skeleton, &sizes).bytes > run.max_memory_bytes {
+        return Ok(sizes);
+    }
     let thinned = espalier_skeleton::skeletonize(&mask, &run.loaded.config.skeleton)
         .map_err(|error| Error::stage(Stage::Skeleton)(boxed(error)))?;
-    Ok(Sizes { skeleton: thinned.skeleton.voxels().len() as u64, ..Sizes::of_mask(&mask) })
+    Ok(Sizes { skeleton: thinned.skeleton.voxels().len() as u64, ..sizes })
 }

@@ -4,7 +4,7 @@
 //! file for each part of the program; a message of a run says what is wrong with this input, an entry what is so in
 //! general.
 //! **Guarantees** every code that a source file can give has an entry, every entry has a source, and exit codes are
-//! those of the errors: `tests/tests/codes.rs` fails otherwise.
+//! those of the errors: `tests/tests/codes/` fails otherwise.
 
 use std::collections::BTreeMap;
 
