@@ -6,19 +6,8 @@ mod program;
 use std::fs;
 use std::path::Path;
 
-use program::{espalier, files_below, stderr};
+use program::{QUICK, Said, espalier, files_below, stderr};
 use serde_json::Value;
-
-const QUICK: [&str; 8] = [
-    "--set",
-    "embed.pso.particles=16",
-    "--set",
-    "embed.pso.iterations=3",
-    "--set",
-    "render.width_px=300",
-    "--set",
-    "report.enabled=false",
-];
 
 /// A gzipped mask of 12³ voxels: a bar along x, or nothing.
 fn mask(is_empty: bool) -> Vec<u8> {
@@ -53,16 +42,9 @@ fn data() -> tempfile::TempDir {
     folder
 }
 
-struct Said {
-    code: Option<i32>,
-    out: String,
-    error: String,
-}
-
 fn bids(folder: &Path, arguments: &[&str]) -> Said {
     let output = espalier(folder, &[&["bids"], arguments, QUICK.as_slice()].concat());
-    let out = String::from_utf8_lossy(&output.stdout).into_owned();
-    Said { code: output.status.code(), out, error: stderr(&output) }
+    Said::by(&output)
 }
 
 fn rows(path: &Path) -> Vec<Vec<String>> {

@@ -6,25 +6,8 @@ mod program;
 use std::fs;
 use std::path::Path;
 
-use program::{espalier, stderr};
+use program::{QUICK, Said, espalier, fork, stderr};
 use serde_json::Value;
-
-const QUICK: [&str; 8] = [
-    "--set",
-    "embed.pso.particles=16",
-    "--set",
-    "embed.pso.iterations=3",
-    "--set",
-    "render.width_px=300",
-    "--set",
-    "report.enabled=false",
-];
-
-/// A fork whose trunk has this length, in mm.
-fn fork(length_mm: f64) -> String {
-    let end = length_mm + 6.0;
-    format!("1 1 0 0 0 2 -1\n2 3 0 -{length_mm} 0 2 1\n3 3 5 -{end} 0 1.2 2\n4 3 -5 -{end} 0 1.2 2\n")
-}
 
 /// Two forks, a mask with a loop that is refused, and a scan that is not there.
 fn data() -> tempfile::TempDir {
@@ -41,16 +24,9 @@ fn data() -> tempfile::TempDir {
     folder
 }
 
-struct Said {
-    code: Option<i32>,
-    out: String,
-    error: String,
-}
-
 fn cohort(folder: &Path, arguments: &[&str]) -> Said {
     let output = espalier(folder, &[&["cohort"], arguments, QUICK.as_slice()].concat());
-    let out = String::from_utf8_lossy(&output.stdout).into_owned();
-    Said { code: output.status.code(), out, error: stderr(&output) }
+    Said::by(&output)
 }
 
 /// The rows of a table without its heading.

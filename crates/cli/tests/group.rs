@@ -3,32 +3,13 @@
 
 mod program;
 
-use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use program::{espalier, stderr};
+use program::{QUICK, espalier, fork, stderr};
 
-const QUICK: [&str; 8] = [
-    "--set",
-    "embed.pso.particles=16",
-    "--set",
-    "embed.pso.iterations=3",
-    "--set",
-    "render.width_px=300",
-    "--set",
-    "report.enabled=false",
-];
 /// A name that no page may have.
 const PATIENT: &str = "DOEJANE19470813";
-
-/// A fork whose trunk has this length, in mm.
-fn fork(length_mm: f64) -> String {
-    let mut swc = "1 1 0 0 0 2 -1\n".to_owned();
-    let _ = writeln!(swc, "2 3 0 -{length_mm} 0 2 1");
-    let _ = writeln!(swc, "3 3 5 -{} 0 1.2 2\n4 3 -5 -{} 0 1.2 2", length_mm + 6.0, length_mm + 6.0);
-    swc
-}
 
 fn run(folder: &Path, input: &str, out: &str, more: &[&str]) -> Option<i32> {
     let set = ["--set", "input.unit=mm"];

@@ -5,6 +5,38 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+/// Settings that make a run quick.
+pub(crate) const QUICK: [&str; 8] = [
+    "--set",
+    "embed.pso.particles=16",
+    "--set",
+    "embed.pso.iterations=3",
+    "--set",
+    "render.width_px=300",
+    "--set",
+    "report.enabled=false",
+];
+
+/// What the program said, and how it ended.
+pub(crate) struct Said {
+    pub(crate) code: Option<i32>,
+    pub(crate) out: String,
+    pub(crate) error: String,
+}
+
+impl Said {
+    pub(crate) fn by(output: &Output) -> Self {
+        let out = String::from_utf8_lossy(&output.stdout).into_owned();
+        Self { code: output.status.code(), out, error: stderr(output) }
+    }
+}
+
+/// A fork whose trunk has this length, in mm, as a tracing.
+pub(crate) fn fork(length_mm: f64) -> String {
+    let end = length_mm + 6.0;
+    format!("1 1 0 0 0 2 -1\n2 3 0 -{length_mm} 0 2 1\n3 3 5 -{end} 0 1.2 2\n4 3 -5 -{end} 0 1.2 2\n")
+}
+
 pub(crate) fn espalier(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_espalier"))
         .args(arguments)
