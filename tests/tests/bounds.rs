@@ -1,7 +1,7 @@
 //! Inputs that claim or unpack to far more than they hold: refused by name, without the memory.
 //!
-//! What is held at the peak is counted by the allocator, so that no figure here depends on the machine. The whole table
-//! of the data's files and these through the program: `scripts/refusals`.
+//! What is held at the peak is counted by the allocator, so that no figure here depends on the machine. The table of
+//! the data's files through the program: `scripts/refusals`.
 #![allow(clippy::expect_used, reason = "this is how a test speaks")]
 
 use std::fs::{self, File};

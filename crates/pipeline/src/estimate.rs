@@ -4,8 +4,9 @@
 //! **Steps** each cost is a sum of sizes, each times a constant of the table below.
 //! **Guarantees** no result depends on it, but that a stage is refused which would take more memory than allowed.
 //! **Source** the constants: chosen on eleven runs by `scripts/estimates`, which prints what was measured beside what this
-//! says. Of a whole run both lie within a factor of 2 there, seconds from 0.5 to 2.0 and memory from 0.7 to 1.3; a layout
-//! that is proven optimal early takes a third of what is said. Seconds depend on the machine, memory does not.
+//! says. Of a whole run both lay within a factor of 2, seconds from 0.5 to 2.0 and memory from 0.7 to 1.3, before tree,
+//! report, radius and skeleton were corrected by what it printed; a layout that is proven
+//! optimal early takes a third of what is said. Seconds depend on the machine, memory does not.
 
 use espalier_geom::math;
 use espalier_model::{Mask, Tree};

@@ -222,20 +222,27 @@ fn tree(step: &mut Step<'_>) -> Result<Outcome, Error> {
 
 /// Warns of a traced tree too large for a neuron where nobody has said what its unit is.
 fn warn_of_unit(tree: &Tree, report: &mut Report) {
+    if let Some(found) = too_large_for_a_neuron(tree) {
+        let way_out = "if it is in voxels, nm or mm, set input.unit or input.scale";
+        report.warn(
+            "W-SWC-UNIT",
+            format!("taken as µm, the tree is {found}, more than neurons are: {way_out}"),
+        );
+    }
+}
+
+/// How a tree is larger than neurons are; none if it is not.
+pub(crate) fn too_large_for_a_neuron(tree: &Tree) -> Option<String> {
     /// Few neurons spread over more than some centimetres.
     const LARGEST_EXTENT_MM: f64 = 100.0;
     /// Somata apart, neurites of mammals and flies stay below 0.01 mm; a tracing in voxels of 8 nm has 0.04.
     const LARGEST_MEAN_RADIUS_MM: f64 = 0.02;
     let (extent_mm, radius_mm) = (2.0 * tree.extent_mm(), tree.mean_radius_mm());
-    let found = if extent_mm > LARGEST_EXTENT_MM {
-        format!("{extent_mm:.0} mm across")
-    } else if radius_mm > LARGEST_MEAN_RADIUS_MM {
-        format!("{:.0} µm thick on average", 2000.0 * radius_mm)
+    if extent_mm > LARGEST_EXTENT_MM {
+        Some(format!("{extent_mm:.0} mm across"))
     } else {
-        return;
-    };
-    let way_out = "if it is in voxels, nm or mm, set input.unit or input.scale";
-    report.warn("W-SWC-UNIT", format!("taken as µm, the tree is {found}, more than neurons are: {way_out}"));
+        (radius_mm > LARGEST_MEAN_RADIUS_MM).then(|| format!("{:.0} µm thick on average", 2000.0 * radius_mm))
+    }
 }
 
 fn views(step: &mut Step<'_>) -> Result<Outcome, Error> {

@@ -181,7 +181,7 @@ impl Examined {
     /// The seconds of all stages on so many cores. Half of the work is done on all of them at once.
     #[must_use]
     pub fn seconds(&self, threads: usize) -> f64 {
-        /// Of the runs of `scripts/estimates`, from a third (layouts) to nine tenths (spheres, pixels).
+        /// Between layouts, of which two starts have a core each, and pixels, which all cores share.
         const PARALLEL: f64 = 0.5;
         let one_core: f64 = self.costs.iter().map(|(_, cost)| cost.cpu_seconds).sum();
         one_core * (1.0 - PARALLEL + PARALLEL / threads.max(1) as f64)

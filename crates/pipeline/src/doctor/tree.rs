@@ -5,11 +5,11 @@
 
 use std::path::Path;
 
+use espalier_model::Tree;
 use espalier_model::swc::Traced;
 use glam::DVec3;
 
 use super::Findings;
-use crate::artifacts::Artifacts;
 use crate::config::Source;
 use crate::error::Error;
 use crate::estimate::Sizes;
@@ -17,9 +17,6 @@ use crate::folder::RunFolder;
 use crate::run::{self, Request, boxed};
 use crate::stage::Stage;
 use crate::steps;
-
-/// Few neurons spread over more than some centimetres.
-const LARGEST_EXTENT_MM: f64 = 100.0;
 
 pub(super) fn examine(run: &Request, path: &Path, source: &Source) -> Result<Findings, Error> {
     steps::check_readable(path, false)?;
@@ -33,10 +30,13 @@ pub(super) fn examine(run: &Request, path: &Path, source: &Source) -> Result<Fin
     for warning in report.warnings {
         found.advise(warning.code, warning.message, "");
     }
-    advise(&traced, &artifacts, &mut found);
+    advise(&traced, &mut found);
     let built = espalier_tree::from_traced(&traced, &run.loaded.config.tree)
         .map_err(|error| Error::stage(Stage::Tree)(boxed(error)))?;
     let tree = &built.tree;
+    if artifacts.is_unit_guessed {
+        advise_on_unit(tree, extent_mm(&traced).max_element(), &mut found);
+    }
     let (n_nodes, n_branches) = (tree.n_nodes(), tree.branches().list().len());
     found.fact("tree_nodes", n_nodes, format!("{n_nodes} in the tree that a run makes of it"));
     found.fact("tree_branches", n_branches, n_branches.to_string());
@@ -68,7 +68,7 @@ fn describe(traced: &Traced, found: &mut Findings) {
     found.fact("extent_mm", extent.to_array().to_vec(), text);
 }
 
-fn advise(traced: &Traced, artifacts: &Artifacts, found: &mut Findings) {
+fn advise(traced: &Traced, found: &mut Findings) {
     let n_roots = n_roots(traced);
     if n_roots > 1 {
         let message = format!("there are {n_roots} roots: several trees in one file");
@@ -83,16 +83,18 @@ fn advise(traced: &Traced, artifacts: &Artifacts, found: &mut Findings) {
             "they get that of their neighbours, or a small one where none has any",
         );
     }
-    let largest_mm = extent_mm(traced).max_element();
-    if artifacts.is_unit_guessed {
-        let message = format!("the file states no unit: taken as µm, it is {} across", length(largest_mm));
-        let way_out = if largest_mm > LARGEST_EXTENT_MM {
-            "that is large for a neuron: --set input.unit=nm, or mm for vessels and airways"
-        } else {
-            "--set input.unit=um says so, or nm, or mm; input.scale for pixels and slices"
-        };
-        found.advise("W-SWC-UNIT", message, way_out);
-    }
+}
+
+/// Here it is said of every tree whose unit is a guess; a run says it only of one that is too large.
+fn advise_on_unit(tree: &Tree, largest_mm: f64, found: &mut Findings) {
+    let message = format!("the file states no unit: taken as µm, it is {} across", length(largest_mm));
+    let way_out = match steps::too_large_for_a_neuron(tree) {
+        Some(size) => format!(
+            "{size} is more than neurons are: --set input.unit=nm, or mm for vessels and airways; input.scale for voxels"
+        ),
+        None => "--set input.unit=um says so, or nm, or mm; input.scale for pixels and slices".to_owned(),
+    };
+    found.advise("W-SWC-UNIT", message, way_out);
 }
 
 fn n_roots(traced: &Traced) -> usize {
