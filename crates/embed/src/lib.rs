@@ -8,8 +8,8 @@
 //! | 4 | `batch`, `trig`, `crossing`, `runs` | the swarm's energy, many particles at once, and its strict crossing count |
 //! | 5 | `pose` | one rigid motion of the whole, mirrored or not; rounding to what is written |
 //! | 6 | `certify`, `widths/…`, `boxes` | the exact certificate; layouts at the widths of their tubes; boxes that meet |
-//! | 7 | `energy`, `losses/…`, `distances` | the one energy and all losses, for every method alike |
-//! | 8 | `select`, `never_worse` | the best certified layout, and the table of all; the last look at it |
+//! | 7 | `energy`, `losses/…`, `distances`, `judged` | the one energy and all losses, for every method alike |
+//! | 8 | `methods`, `select`, `summary`, `never_worse` | the methods' run; the best certified layout and the table of all; what is said of them; the last look |
 //! | 9 | `replay`, `pins` | manual edits in it: branches turned and pinned, the rest laid around them |
 //!
 //! **Cost** Targets, radial, cone, pose and energy are linear in N. The certificate sorts and sweeps, N log N on
@@ -31,8 +31,10 @@ mod crossing;
 mod distances;
 mod energy;
 mod error;
+mod judged;
 mod layout;
 mod losses;
+mod methods;
 mod never_worse;
 mod params;
 mod paths;
@@ -48,6 +50,7 @@ mod select;
 mod separation;
 mod siblings;
 mod solver;
+mod summary;
 mod targets;
 mod trig;
 mod weights;
@@ -180,11 +183,11 @@ pub fn embed_edited(
     let mut problem = problem::Problem::new(tree, branches, targets, params);
     problem.is_crowded = prospect::is_crowded(&problem, params, seed);
     let (mirrored, mirrors_report) = solver::mirrors::mirrored(&problem, params, seed);
-    let problems = select::Problems {
+    let problems = methods::Problems {
         frozen: mirrored.as_ref().unwrap_or(&problem),
         unflipped: mirrored.is_some().then_some(&problem),
     };
-    let layouts = select::run_methods(problems, views, params, seed, events)?;
+    let layouts = methods::run(problems, views, params, seed, events)?;
     let mut embedded = select::select(problems, layouts, edits, (params, seed))?;
     embedded.report.extend(mirrors_report);
     embedded.report.extend(weights_report);

@@ -10,7 +10,8 @@ use espalier_geom::math;
 use espalier_geom::random::Stream;
 
 use super::moves::Mover;
-use super::state::{Prices, Saved, State, Step, Terms};
+use super::state::{Saved, State};
+use super::step::{Prices, Step, Terms};
 
 /// The temperature is set anew after this many evaluations.
 const STRIDE: u64 = 64;

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `setting` | what stays the same: bends, angles in space, headings, the rule of faults |
 //! | `isometry`, `rectangle`, `hierarchy`, `conflicts` | parts of the tree that move as a whole, and who meets whom |
-//! | `state` | the layout, what a move would change, and taking it |
+//! | `step`, `state`, `change` | a change of sides; the layout; what the change would cost, and taking it |
 //! | `moves` | which turns change sides together |
 //! | `anneal` | the walk |
 //! | `settle` | the last walk, for distances |
@@ -17,10 +17,11 @@
 //! against the targets given, each as dear as the smaller of its two bends.
 //! **Steps** 1. Simulated annealing at full prices. 2. While something crosses, again from the best state, with all
 //! prices but that of crossings lowered. 3. Polish: annealing from a low temperature, where headings count twice, with
-//! the evaluations that are left. 4. Settling: distances between nodes as in space. Two walks with different random numbers run side by side and are compared at the end
-//! of each round; the polish goes on from the better one.
+//! the evaluations that are left. 4. Settling: distances between nodes as in space. Two walks with different random
+//! numbers run side by side and are compared at the end of each round; the polish goes on from the better one.
 //! **Guarantees** sizes of bends stay, up to the distance that siblings keep. Without a crossing at the start
-//! nothing changes, but under `root_keep_out = "on"` where an edge is behind the root. Never more crossings than at the start.
+//! nothing changes, but under `root_keep_out = "on"` where an edge is behind the root. Never more crossings than at the
+//! start.
 //! **Differs from the prototype** it mirrored whole local planes first, which finds nothing that single turns do not.
 //! Why not a swarm over the mirror bits? Of seven neurons of 135 to 300 nodes whose planes cross, a binary swarm with one
 //! bit per plane ended without a crossing on three, and with 1, 1, 2 and 4 on the others, after 123,000 evaluations;
@@ -29,6 +30,7 @@
 //! **Cost** see `hierarchy`; evaluations and the blocks that they look at are counted, and limited by N.
 
 mod anneal;
+mod change;
 #[cfg(test)]
 mod checks;
 mod conflicts;
@@ -39,6 +41,7 @@ mod rectangle;
 mod setting;
 mod settle;
 mod state;
+mod step;
 
 use std::f64::consts::PI;
 
@@ -56,12 +59,12 @@ use crate::siblings;
 use anneal::{Phase, Walker};
 use setting::Setting;
 use settle::Distances;
-pub(crate) use state::Terms;
-use state::{Prices, State};
+use state::State;
+use step::Prices;
+pub(crate) use step::Terms;
 
 /// The evaluations of one walk are this much at most, times N (but no more than `Problem::n_joints`) to the power
-/// below: 70,000 for 235 nodes, 200,000 for
-/// 1000, where one takes 1 and 4 µs.
+/// below: 70,000 for 235 nodes, 200,000 for 1000, where one takes 1 and 4 µs.
 const EVALUATIONS: f64 = 1800.0;
 const EVALUATIONS_POWER: f64 = 0.68;
 /// From this size on walks are as much longer as the tree is larger, up to a limit. A neuron of 50,000 nodes gets four

@@ -24,7 +24,8 @@ use glam::DVec2;
 use super::conflicts::Conflict;
 use super::isometry::Isometry;
 use super::setting::MOST_SIBLINGS_FLIPPED;
-use super::state::{NewTurn, Part, State, Step};
+use super::state::State;
+use super::step::{NewTurn, Part, Step};
 use crate::siblings;
 
 /// Of 100 moves, how many are on the path of a conflict: 70 in the measured prototype.

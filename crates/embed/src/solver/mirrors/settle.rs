@@ -16,7 +16,8 @@ use glam::DVec2;
 
 use super::anneal::{Phase, Walker};
 use super::setting::Setting;
-use super::state::{State, Step, Terms};
+use super::state::State;
+use super::step::{Step, Terms};
 
 /// The most nodes whose pairs are looked at: 160 gain little over 96, at three times the cost.
 const SAMPLE: usize = 96;
