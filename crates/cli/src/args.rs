@@ -101,9 +101,49 @@ pub(crate) struct Common {
     /// How large that folder may be after a run; what was used least lately goes first
     #[arg(long, global = true, value_name = "SIZE", default_value = "20G", value_parser = parse_size)]
     pub(crate) cache_size: u64,
-    /// Print results and errors only
+    /// Speak to programs: results as JSON on standard output, and on standard error a JSON object a line for all that
+    /// happens, as espalier info --events describes them; the last one of a command that fails says why
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+    /// Print results, warnings and errors only
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
+    /// Say more: the settings that are not at their default, and why a stage is done; -vv also what each stage counted,
+    /// and what its parts took
+    #[arg(short, long, global = true, action = clap::ArgAction::Count, conflicts_with = "quiet")]
+    pub(crate) verbose: u8,
+}
+
+impl Command {
+    /// Its name, as it is typed.
+    pub(crate) fn name(&self) -> &'static str {
+        match self {
+            Self::Run(_) => "run",
+            Self::Compare(_) => "compare",
+            Self::Juxtapose(_) => "juxtapose",
+            Self::Sweep(_) => "sweep",
+            Self::Group(_) => "group",
+            Self::Cohort(_) => "cohort",
+            Self::Bids(_) => "bids",
+            Self::Phantom(_) => "phantom",
+            Self::Volume(_) => "volume",
+            Self::Skeleton(_) => "skeleton",
+            Self::Radius(_) => "radius",
+            Self::Tree(_) => "tree",
+            Self::Views(_) => "views",
+            Self::Embed(_) => "embed",
+            Self::Render(_) => "render",
+            Self::Report(_) => "report",
+            Self::Verify(_) => "verify",
+            Self::Profile(_) => "profile",
+            Self::Locate(_) => "locate",
+            Self::Info(_) => "info",
+            Self::Config(_) => "config",
+            Self::Explain(_) => "explain",
+            Self::Doctor(_) => "doctor",
+            Self::Completions { .. } => "completions",
+        }
+    }
 }
 
 impl Arguments {
@@ -492,9 +532,6 @@ pub(crate) struct VerifyArguments {
     /// The run folder
     #[arg(value_name = "RUN")]
     pub(crate) folder: PathBuf,
-    /// Print the checks as JSON
-    #[arg(long)]
-    pub(crate) json: bool,
 }
 
 const DOCTOR_HELP: &str = "\
@@ -515,9 +552,6 @@ pub(crate) struct DoctorArguments {
     /// Inputs, or configs (.toml)
     #[arg(required = true, value_name = "INPUT")]
     pub(crate) inputs: Vec<PathBuf>,
-    /// Print what was found as JSON: a list with an entry for each input
-    #[arg(long)]
-    pub(crate) json: bool,
 }
 
 const PROFILE_HELP: &str = "\
@@ -601,17 +635,14 @@ pub(crate) struct LocateArguments {
     /// Two numbers are pixels of planar.png, from 0 at the upper left
     #[arg(long)]
     pub(crate) pixel: bool,
-    /// Print the points as JSON
-    #[arg(long)]
-    pub(crate) json: bool,
 }
 
 /// `espalier info`.
 #[derive(Debug, Args)]
 pub(crate) struct InfoArguments {
-    /// Print as JSON
+    /// Print the JSON Schema of the lines that --json prints on standard error
     #[arg(long)]
-    pub(crate) json: bool,
+    pub(crate) events: bool,
 }
 
 /// `espalier config`.
@@ -630,9 +661,6 @@ pub(crate) enum ConfigCommand {
 pub(crate) struct KeyArguments {
     /// A key such as tree.root, or a section such as embed.pso [default: all keys]
     pub(crate) key: Option<String>,
-    /// Print as JSON: key, kind, unit, default, range, choices, text
-    #[arg(long)]
-    pub(crate) json: bool,
 }
 
 /// `espalier config init`.
@@ -651,9 +679,6 @@ pub(crate) struct InitArguments {
 pub(crate) struct ExplainArguments {
     /// The code, as the message has it in square brackets [default: list all codes]
     pub(crate) code: Option<String>,
-    /// Print as JSON: code, part, exit_codes, title, cause, way_out, example
-    #[arg(long)]
-    pub(crate) json: bool,
 }
 
 /// An argument such as `-32.7,4,5` is a point, not an option: a blank before it says so, which readers of points pass over.

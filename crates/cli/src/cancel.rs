@@ -17,8 +17,10 @@ pub(crate) fn end_on_signals() {
     let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
     std::thread::spawn(move || {
         if let Some(signal) = signals.forever().next() {
-            progress::line("cancelled: what was done is in place; the same command goes on from there");
-            std::process::exit(SIGNAL_BASE + signal);
+            let exit_code = SIGNAL_BASE + signal;
+            let message = "cancelled: what was done is in place; the same command goes on from there";
+            progress::last_line(message, u8::try_from(exit_code).unwrap_or(u8::MAX));
+            std::process::exit(exit_code);
         }
     });
 }

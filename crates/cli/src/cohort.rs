@@ -1,11 +1,15 @@
 //! Many scans at one command: `espalier cohort` and `espalier bids`.
 
-use espalier_model::Diagnose;
-use espalier_pipeline::{BidsRequest, Cohort, CohortPage, CohortRequest, Effort, PageRequest, Sample, Turn};
+use espalier_pipeline::event_lines::{Failure, Line};
+use espalier_pipeline::{
+    BidsRequest, Cohort, CohortPage, CohortRequest, Effort, FailedSample, PageRequest, Sample, Turn,
+};
+use serde_json::json;
 
 use crate::args::{Arguments, BidsArguments, CohortArguments, PageArguments, Rerun};
-use crate::commands::{cache, data_dir, half_of_memory, print_error, print_summary};
+use crate::commands::{cache, data_dir, half_of_memory};
 use crate::progress::{self, Progress};
+use crate::{failure, summary};
 
 /// `espalier cohort`.
 pub(crate) fn execute(arguments: &Arguments, cohort: &CohortArguments) -> anyhow::Result<()> {
@@ -73,20 +77,35 @@ fn print_list(cohort: &Cohort, effort: &Effort) -> anyhow::Result<()> {
 
 /// Does the scans; of each its id, how it goes, and its digest or its error.
 fn perform(arguments: &Arguments, cohort: &Cohort, effort: &Effort) -> anyhow::Result<()> {
-    let show = Progress::new(arguments.common.quiet);
+    let show = Progress::new(&arguments.common);
     let n_samples = cohort.samples.len();
-    let said = |sample: &Sample, turn: Turn<'_>| match turn {
-        Turn::Begins if arguments.common.quiet => {}
-        Turn::Begins => progress::line(&format!("== {}", sample.id)),
-        Turn::Done(summary) => progress::result(&format!("{}\tdigest {}", sample.id, summary.digest)),
-        // The error of a single scan is that of the command.
-        Turn::Failed(_) if n_samples == 1 => {}
-        Turn::Failed(error) => {
-            progress::line(&format!("{} failed", sample.id));
-            print_error(error.code(), error, &error.hint());
+    let said = |sample: &Sample, turn: Turn<'_>| {
+        if arguments.common.json {
+            return tell(sample, turn);
+        }
+        match turn {
+            Turn::Begins if arguments.common.quiet => {}
+            Turn::Begins => progress::line(&format!("== {}", sample.id)),
+            Turn::Done(summary) => progress::result(&format!("{}\tdigest {}", sample.id, summary.digest)),
+            // The error of a single scan is that of the command.
+            Turn::Failed(_) if n_samples == 1 => {}
+            Turn::Failed(error) => {
+                progress::line(&format!("{} failed", sample.id));
+                failure::report(error);
+            }
         }
     };
     Ok(cohort.perform(effort, &|event| show.show(event), &said)?)
+}
+
+/// Tells programs where a scan stands.
+fn tell(sample: &Sample, turn: Turn<'_>) {
+    let (scan, folder) = (sample.id.clone(), sample.out.display().to_string());
+    progress::tell(&match turn {
+        Turn::Begins => Line::ScanStarted { scan, folder },
+        Turn::Done(summary) => Line::ScanDone { scan, folder, digest: summary.digest.clone() },
+        Turn::Failed(error) => Line::ScanFailed { scan, folder, failure: Failure::of(error) },
+    });
 }
 
 /// Makes the page and prints what it says of failures.
@@ -97,12 +116,23 @@ fn print_page(arguments: &Arguments, cohort: &Cohort, page: &PageArguments) -> a
         threads: arguments.common.threads.map(usize::from),
     };
     let CohortPage { table, failed, failures_file, summary } = cohort.page(&request)?;
+    if arguments.common.json {
+        let of_scan = |failed: &FailedSample| {
+            let FailedSample { id, code, reason, done_to, retry } = failed;
+            json!({ "scan": id, "code": code, "reason": reason, "done_to": done_to, "retry": retry })
+        };
+        let mut parts = summary::of(&summary);
+        parts.insert("failures_file".to_owned(), failures_file.display().to_string().into());
+        parts.insert("failed".to_owned(), failed.iter().map(of_scan).collect());
+        summary::print_json(parts);
+        return Ok(());
+    }
     progress::result(&table);
     for failed in &failed {
         let retry = failed.retry.as_ref().map(|retry| format!("\n    {retry}")).unwrap_or_default();
         progress::result(&format!("{}  {}  {}{retry}", failed.id, failed.code, failed.reason));
     }
     progress::result(&failures_file.display().to_string());
-    print_summary(&summary);
+    summary::print(&summary, false);
     Ok(())
 }

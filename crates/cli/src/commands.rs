@@ -4,12 +4,10 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use anyhow::anyhow;
 use clap::CommandFactory;
 use espalier_model::Diagnose;
-use espalier_model::diagnose::Class;
 use espalier_pipeline::{
     Align, Artifact, Cache, ChangeOf, CompareRequest, Config, DoctorRequest, Error, GroupRequest,
     JuxtaposeParams, JuxtaposeRequest, Loaded, Override, Plan, PlotRequest, Plotted, Reason, Request,
@@ -22,7 +20,7 @@ use crate::args::{
     SweepArguments, VerifyArguments,
 };
 use crate::progress::{self, Progress};
-use crate::{checks, cohort, config, explain, info};
+use crate::{checks, cohort, config, explain, failure, info, summary};
 
 /// Memory assumed where the machine does not tell its own.
 const FALLBACK_MEMORY_BYTES: u64 = 4 << 30;
@@ -52,23 +50,15 @@ pub(crate) fn execute(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Doctor(doctor) => return examine(arguments, doctor),
         Command::Locate(locate) => return print_located(arguments, locate),
         Command::Info(arguments_of_info) => return info::print(arguments, arguments_of_info),
-        Command::Config(command) => return config::execute(command),
-        Command::Explain(explain) => return explain::print(explain),
+        Command::Config(command) => return config::execute(command, arguments.common.json),
+        Command::Explain(explain) => return explain::print(explain, arguments.common.json),
         Command::Completions { shell } => {
             progress::result(completions(*shell).trim_end());
             return Ok(());
         }
     };
-    print_summary(&summary);
+    summary::print(&summary, arguments.common.json);
     Ok(())
-}
-
-/// Prints the files that say most, and the digest.
-pub(crate) fn print_summary(summary: &Summary) {
-    for file in &summary.highlights {
-        progress::result(&summary.out.join(file).display().to_string());
-    }
-    progress::result(&format!("digest {}", summary.digest));
 }
 
 /// The script that completes commands and options.
@@ -82,7 +72,7 @@ fn completions(shell: clap_complete::Shell) -> String {
 fn verify_folder(arguments: &Arguments, verify: &VerifyArguments) -> anyhow::Result<()> {
     let threads = arguments.common.threads.map(usize::from);
     let verification = espalier_pipeline::verify(&verify.folder, threads)?;
-    if verify.json {
+    if arguments.common.json {
         progress::result(verification.to_json().trim_end());
     } else {
         let is_shown = |fails: bool| fails || !arguments.common.quiet;
@@ -106,12 +96,36 @@ fn print_profile(arguments: &Arguments, profile: &ProfileArguments) -> anyhow::R
             overrides: arguments.common.overrides.clone(),
         };
         let plotted = espalier_pipeline::plot_profile(&request)?;
-        progress::result(&narrowest_line(&plotted));
-        progress::result(&plot.display().to_string());
+        if arguments.common.json {
+            progress::result(&narrowest_json(plot, &plotted).to_string());
+        } else {
+            progress::result(&narrowest_line(&plotted));
+            progress::result(&plot.display().to_string());
+        }
         return Ok(());
     }
-    progress::result(espalier_pipeline::profile(&profile.folder, way_to)?.trim_end());
+    let table = espalier_pipeline::profile(&profile.folder, way_to)?;
+    progress::result(&if arguments.common.json {
+        summary::rows(&table)
+    } else {
+        table.trim_end().to_owned()
+    });
     Ok(())
+}
+
+fn narrowest_json(plot: &Path, plotted: &Plotted) -> serde_json::Value {
+    let place = plotted.narrowest.as_ref().map(|place| {
+        serde_json::json!({
+            "narrowing_percent": place.narrowing_percent,
+            "from_root_mm": place.from_root_mm,
+            "branch": place.branch,
+            "node": place.node,
+            "radius_mm": place.radius_mm,
+            "reference_radius_mm": place.reference_radius_mm,
+            "is_listed": plotted.is_listed,
+        })
+    });
+    serde_json::json!({ "file": plot.display().to_string(), "narrowest": place })
 }
 
 fn narrowest_line(plotted: &Plotted) -> String {
@@ -147,7 +161,7 @@ fn print_located(arguments: &Arguments, locate: &LocateArguments) -> anyhow::Res
     }
     let max_memory = arguments.common.max_memory.unwrap_or_else(half_of_memory);
     let located = espalier_pipeline::locate(&locate.folder, &points, max_memory)?;
-    let text = match (locate.json, points.len()) {
+    let text = match (arguments.common.json, points.len()) {
         (true, _) => located.to_json(),
         (false, 1) => located.to_text(),
         _ => located.to_tsv(),
@@ -176,27 +190,6 @@ fn read_table(path: &Path) -> Result<(String, String), Error> {
     Ok((name.display().to_string(), text))
 }
 
-/// Prints an error with its code and way out, and gives the exit code of its class.
-pub(crate) fn report_failure(error: &anyhow::Error) -> ExitCode {
-    let known = error.downcast_ref::<Error>();
-    let (code, class, hint) = known.map_or(("E-USAGE", Class::Usage, String::new()), |known| {
-        (known.code(), known.class(), known.hint())
-    });
-    print_error(code, error, &hint);
-    ExitCode::from(class.exit_code())
-}
-
-/// Prints an error with its code and way out.
-pub(crate) fn print_error(code: &str, error: &dyn std::fmt::Display, hint: &str) {
-    progress::line(&format!("error[{code}]: {error}"));
-    if !hint.is_empty() {
-        progress::line(&format!("  hint: {hint}"));
-    }
-    if espalier_pipeline::explain::is_worth_reading(code, hint) {
-        progress::line(&format!("  more: espalier explain {code}"));
-    }
-}
-
 fn run_pipeline(arguments: &Arguments, run: &RunArguments) -> anyhow::Result<Summary> {
     perform(arguments, &pipeline_request(arguments, run)?)
 }
@@ -211,6 +204,10 @@ fn pipeline_request(arguments: &Arguments, run: &RunArguments) -> anyhow::Result
 /// Prints which stages a run would do, and why.
 fn print_plan(arguments: &Arguments, run: &RunArguments) -> anyhow::Result<()> {
     let plans = espalier_pipeline::plan(&pipeline_request(arguments, run)?)?;
+    if arguments.common.json {
+        progress::result(&summary::plan(&plans));
+        return Ok(());
+    }
     let costs: Vec<_> = plans.iter().filter_map(|plan| Some((plan.stage, plan.cost?))).collect();
     for Plan { stage, reason, is_shared, .. } in plans {
         let text = match reason {
@@ -242,7 +239,7 @@ fn examine(arguments: &Arguments, doctor: &DoctorArguments) -> anyhow::Result<()
         };
         let name = input.display().to_string();
         match espalier_pipeline::doctor(&request) {
-            Ok(examined) if doctor.json => {
+            Ok(examined) if arguments.common.json => {
                 entries.push(serde_json::json!({ "input": name, "found": examined.to_json(threads) }));
             }
             Ok(examined) => progress::result(examined.to_text(threads).trim_end()),
@@ -252,14 +249,14 @@ fn examine(arguments: &Arguments, doctor: &DoctorArguments) -> anyhow::Result<()
                 entries.push(serde_json::json!({ "input": name, "error": told }));
                 // The last word on the first one is that of every command.
                 let error = anyhow::Error::from(error);
-                if first_error.is_some() {
-                    report_failure(&error);
+                if first_error.is_some() && !arguments.common.json {
+                    failure::last_word(&error);
                 }
                 first_error.get_or_insert(error);
             }
         }
     }
-    if doctor.json {
+    if arguments.common.json {
         let whole = serde_json::json!({ "format": "espalier-doctor", "version": 1, "inputs": entries });
         progress::result(&serde_json::to_string_pretty(&whole).unwrap_or_default());
     }
@@ -283,9 +280,9 @@ fn run_compare(arguments: &Arguments, compare: &CompareArguments) -> anyhow::Res
         data_dir: data_dir(),
         cache: cache(arguments),
     };
-    let progress = Progress::new(arguments.common.quiet);
+    let progress = Progress::new(&arguments.common);
     let compared = espalier_pipeline::compare(&request, &|event| progress.show(event))?;
-    progress::result(&compared.table);
+    summary::table(&compared.table, arguments.common.json);
     Ok(compared.summary)
 }
 
@@ -313,9 +310,9 @@ fn run_juxtapose(arguments: &Arguments, juxtapose: &JuxtaposeArguments) -> anyho
         data_dir: data_dir(),
         cache: cache(arguments),
     };
-    let progress = Progress::new(arguments.common.quiet);
+    let progress = Progress::new(&arguments.common);
     let compared = espalier_pipeline::juxtapose(&request, &|event| progress.show(event))?;
-    progress::result(&compared.table);
+    summary::table(&compared.table, arguments.common.json);
     Ok(compared.summary)
 }
 
@@ -330,9 +327,9 @@ fn run_sweep(arguments: &Arguments, sweep: &SweepArguments) -> anyhow::Result<Su
         data_dir: data_dir(),
         cache: cache(arguments),
     };
-    let progress = Progress::new(arguments.common.quiet);
+    let progress = Progress::new(&arguments.common);
     let swept = espalier_pipeline::sweep(&request, &|event| progress.show(event))?;
-    progress::result(&swept.table);
+    summary::table(&swept.table, arguments.common.json);
     Ok(swept.summary)
 }
 
@@ -346,7 +343,7 @@ fn run_group(arguments: &Arguments, group: &GroupArguments) -> anyhow::Result<Su
     };
     let grouped = espalier_pipeline::group(&request)?;
     grouped.notes.iter().for_each(|note| progress::line(&format!("note: {note}")));
-    progress::result(&grouped.table);
+    summary::table(&grouped.table, arguments.common.json);
     Ok(grouped.summary)
 }
 
@@ -477,7 +474,7 @@ fn request(arguments: &Arguments, loaded: Loaded, out: PathBuf) -> Request {
 }
 
 fn perform(arguments: &Arguments, request: &Request) -> anyhow::Result<Summary> {
-    let progress = Progress::new(arguments.common.quiet);
+    let progress = Progress::new(&arguments.common);
     Ok(espalier_pipeline::run(request, &|event| progress.show(event))?)
 }
 

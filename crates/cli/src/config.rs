@@ -7,22 +7,22 @@ use crate::args::{ConfigCommand, InitArguments, KeyArguments};
 use crate::{explain, progress};
 
 /// Does what the arguments say.
-pub(crate) fn execute(command: &ConfigCommand) -> anyhow::Result<()> {
+pub(crate) fn execute(command: &ConfigCommand, is_json: bool) -> anyhow::Result<()> {
     match command {
         ConfigCommand::Schema => progress::result(schema_text().trim_end()),
-        ConfigCommand::Explain(arguments) => progress::result(&explained(arguments)?),
+        ConfigCommand::Explain(arguments) => progress::result(&explained(arguments, is_json)?),
         ConfigCommand::Init(arguments) => init(arguments)?,
     }
     Ok(())
 }
 
-fn explained(arguments: &KeyArguments) -> anyhow::Result<String> {
+fn explained(arguments: &KeyArguments, is_json: bool) -> anyhow::Result<String> {
     let found = match &arguments.key {
         Some(name) => explain_keys(name)?,
         None => keys(),
     };
     Ok(match found.as_slice() {
-        _ if arguments.json => serde_json::to_string_pretty(&found)?,
+        _ if is_json => serde_json::to_string_pretty(&found)?,
         [key] => page(key),
         found => list(found),
     })

@@ -10,14 +10,14 @@ use crate::progress;
 const WIDTH: usize = 96;
 
 /// Prints one code, or all.
-pub(crate) fn print(arguments: &ExplainArguments) -> anyhow::Result<()> {
+pub(crate) fn print(arguments: &ExplainArguments, is_json: bool) -> anyhow::Result<()> {
     let Some(code) = &arguments.code else {
         let all = catalogue();
-        progress::result(&if arguments.json { json(&all)? } else { list(&all) });
+        progress::result(&if is_json { json(&all)? } else { list(&all) });
         return Ok(());
     };
     let entry = explain(code)?;
-    progress::result(&if arguments.json { json(&entry)? } else { page(&entry) });
+    progress::result(&if is_json { json(&entry)? } else { page(&entry) });
     Ok(())
 }
 

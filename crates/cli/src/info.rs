@@ -1,4 +1,4 @@
-//! What this program is, and what it has here.
+//! What this program is, what it has here, and what its lines for programs look like.
 
 use espalier_pipeline::info::{Info, info};
 use serde::Serialize;
@@ -19,13 +19,17 @@ struct Here {
 
 /// Prints what the program is.
 pub(crate) fn print(arguments: &Arguments, of_info: &InfoArguments) -> anyhow::Result<()> {
+    if of_info.events {
+        progress::result(espalier_pipeline::event_lines::schema_text().trim_end());
+        return Ok(());
+    }
     let per_core = || std::thread::available_parallelism().map_or(1, usize::from);
     let here = Here {
         info: info(),
         threads: arguments.common.threads.map_or_else(per_core, usize::from),
         max_memory_bytes: arguments.common.max_memory.unwrap_or_else(commands::half_of_memory),
     };
-    progress::result(&if of_info.json { serde_json::to_string_pretty(&here)? } else { page(&here) });
+    progress::result(&if arguments.common.json { serde_json::to_string_pretty(&here)? } else { page(&here) });
     Ok(())
 }
 

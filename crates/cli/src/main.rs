@@ -10,8 +10,10 @@ mod cohort;
 mod commands;
 mod config;
 mod explain;
+mod failure;
 mod info;
 mod progress;
+mod summary;
 
 use std::process::ExitCode;
 
@@ -23,16 +25,15 @@ fn main() -> ExitCode {
     cancel::end_on_signals();
     let arguments = match args::Arguments::try_parse_from(std::env::args_os().map(args::shield_point)) {
         Ok(arguments) => arguments.with_all_overrides(),
-        Err(error) => {
-            // Help and version are results, not errors; clap knows which is which.
-            let _ = error.print();
-            return ExitCode::from(if error.use_stderr() { Class::Usage.exit_code() } else { 0 });
-        }
+        Err(error) => return failure::of_arguments(&error),
     };
+    if arguments.common.json {
+        progress::speak_to_programs(arguments.command.name());
+    }
     match commands::execute(&arguments) {
         Ok(()) if progress::results_arrived() => ExitCode::SUCCESS,
         Ok(()) => ExitCode::from(Class::Io.exit_code()),
-        Err(error) => commands::report_failure(&error),
+        Err(error) => failure::last_word(&error),
     }
 }
 
@@ -40,8 +41,13 @@ fn main() -> ExitCode {
 fn turn_panics_into_exit_code_1() {
     let print_message = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
-        print_message(info);
-        progress::line("error: this is a bug in espalier; please report the lines above");
-        std::process::exit(i32::from(Class::Internal.exit_code()));
+        let exit_code = Class::Internal.exit_code();
+        if progress::is_for_programs() {
+            progress::last_line(&format!("this is a bug in espalier; please report it: {info}"), exit_code);
+        } else {
+            print_message(info);
+            progress::last_line("error: this is a bug in espalier; please report the lines above", exit_code);
+        }
+        std::process::exit(i32::from(exit_code));
     }));
 }

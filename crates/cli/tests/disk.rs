@@ -128,13 +128,17 @@ fn a_folder_that_cannot_be_made() {
 #[test]
 fn results_that_cannot_be_printed() {
     let folder = folder();
-    let full = std::fs::File::options().write(true).open("/dev/full").expect("/dev/full");
-    let output = Command::new(env!("CARGO_BIN_EXE_espalier"))
-        .args(RUN)
-        .current_dir(folder.path())
-        .stdout(full)
-        .output()
-        .expect("the program starts");
-    assert_eq!(output.status.code(), Some(74), "{}", stderr(&output));
+    for arguments in [&RUN[..], &["--help"], &["--version"], &["embed", "--help"], &["explain"]] {
+        let full = std::fs::File::options().write(true).open("/dev/full").expect("/dev/full");
+        let output = Command::new(env!("CARGO_BIN_EXE_espalier"))
+            .args(arguments)
+            .current_dir(folder.path())
+            .stdout(full)
+            .output()
+            .expect("the program starts");
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(74), "{arguments:?}: {said}");
+        assert_eq!(said.matches("error[E-IO-PRINT]: cannot print results").count(), 1, "{said}");
+    }
     assert_whole(folder.path());
 }

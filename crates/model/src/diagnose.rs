@@ -1,6 +1,7 @@
 //! What every error of espalier can say about itself.
 
 use std::borrow::Cow;
+use std::path::Path;
 
 /// The class of an error, which decides the exit code of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -81,6 +82,14 @@ pub trait Diagnose: std::error::Error {
     /// What the user can do about it; empty where the message says it all.
     fn hint(&self) -> String {
         String::new()
+    }
+    /// The file or folder that is wrong, where the error knows it.
+    fn file(&self) -> Option<&Path> {
+        None
+    }
+    /// The line of that file, from 1, where it is one.
+    fn line(&self) -> Option<usize> {
+        None
     }
 }
 

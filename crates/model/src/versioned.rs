@@ -99,6 +99,13 @@ impl Diagnose for FileError {
         }
         .to_owned()
     }
+
+    fn line(&self) -> Option<usize> {
+        match self {
+            Self::Malformed { source, .. } => Some(source.line()).filter(|line| *line > 0),
+            _ => None,
+        }
+    }
 }
 
 #[derive(Serialize, Deserialize)]

@@ -339,6 +339,12 @@ pub enum Error {
         /// What the system said.
         source: io::Error,
     },
+    /// Results cannot be printed.
+    #[error("cannot print results: {source}")]
+    Print {
+        /// What the system said.
+        source: io::Error,
+    },
     /// Another run holds the folder.
     #[error("another run is at work in {folder}", folder = folder.display())]
     Locked {
@@ -456,6 +462,7 @@ impl Diagnose for Error {
             Self::TooLarge { .. } | Self::Memory { .. } => "E-LIMIT-MEMORY",
             Self::Create { .. } => "E-IO-CREATE",
             Self::Write { .. } => "E-IO-WRITE",
+            Self::Print { .. } => "E-IO-PRINT",
             Self::Locked { .. } => "E-RUN-LOCKED",
             Self::Threads { .. } => "E-RUN-THREADS",
             Self::UnknownCode { .. } => "E-EXPLAIN-CODE",
@@ -499,7 +506,8 @@ impl Diagnose for Error {
             | Self::NoTree { .. }
             | Self::MissingArtifact { .. }
             | Self::Read { .. }
-            | Self::Write { .. } => Class::Io,
+            | Self::Write { .. }
+            | Self::Print { .. } => Class::Io,
             Self::Altered { .. } | Self::Certificate { .. } | Self::Unverified { .. } => Class::Uncertified,
             Self::TooLarge { .. } | Self::Memory { .. } => Class::Limit,
             Self::Create { .. } | Self::BidsOutput { .. } => Class::CannotCreate,
@@ -579,10 +587,52 @@ impl Diagnose for Error {
             }
             Self::Create { .. } => "choose another folder with -o".to_owned(),
             Self::Write { .. } => "check the free space and the permissions of the folder".to_owned(),
+            Self::Print { .. } => "what was done is in place; send standard output to where there is room".to_owned(),
             Self::Locked { .. } => "wait for it with --wait, or choose another folder with -o".to_owned(),
             Self::NoSuchStage { .. } | Self::EmptyRange { .. } | Self::Read { .. } | Self::Threads { .. } => {
                 String::new()
             }
+        }
+    }
+
+    fn file(&self) -> Option<&Path> {
+        match self {
+            Self::Config(error) => error.file(),
+            Self::Stage { cause, .. } => cause.file(),
+            Self::File { path, cause } => cause.file().or(Some(path)),
+            Self::Point { source_name, .. } => source_name.as_ref().map(Path::new),
+            Self::MissingArtifact { path, .. }
+            | Self::Altered { path }
+            | Self::Samples { path, .. }
+            | Self::BidsDataset { path, .. }
+            | Self::Certificate { path, .. }
+            | Self::PlotFormat { path }
+            | Self::ResultInTheWay { path }
+            | Self::InputInTheWay { path }
+            | Self::OtherInput { path, .. }
+            | Self::Read { path, .. }
+            | Self::TooLarge { path, .. }
+            | Self::Create { path, .. }
+            | Self::Write { path, .. } => Some(path),
+            Self::NoRun { folder, .. }
+            | Self::NoTree { folder, .. }
+            | Self::NoBidsScan { folder, .. }
+            | Self::BidsOutput { folder }
+            | Self::RunInTheWay { folder }
+            | Self::Settled { folder, .. }
+            | Self::SettledTree { folder, .. }
+            | Self::Unverified { folder, .. }
+            | Self::Locked { folder } => Some(folder),
+            _ => None,
+        }
+    }
+
+    fn line(&self) -> Option<usize> {
+        match self {
+            Self::Config(error) => error.line(),
+            Self::Stage { cause, .. } | Self::File { cause, .. } => cause.line(),
+            Self::Point { cause, .. } => cause.line(),
+            _ => None,
         }
     }
 }

@@ -158,6 +158,7 @@ fn results(
         espalier_juxtapose::juxtapose(&runs[0].tree, &runs[1].tree, &request.params).map_err(failed)?;
     for warning in compared.report.warnings {
         events(Event::Warning {
+            file: None,
             stage: Stage::Tree,
             code: warning.code.to_owned(),
             message: warning.message,

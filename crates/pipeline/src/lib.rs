@@ -22,6 +22,7 @@
 //! | the page of a run: what it is made from | `page` |
 //! | what the columns of the tables mean | `dictionary` |
 //! | what each error and warning code means | [`mod@explain`] |
+//! | what a run tells while it goes on, and as lines of JSON | `event`, [`event_lines`] |
 //! | what this program is, reads and writes | [`mod@info`] |
 //! | a point of the scan on the map, and back | [`mod@locate`] |
 //! | the calibre on the way to a place, as a table or a plot | [`profile()`], [`plot_profile`] |
@@ -44,6 +45,7 @@ mod doctor;
 mod error;
 pub mod estimate;
 mod event;
+pub mod event_lines;
 pub mod explain;
 mod failure;
 mod folder;
@@ -84,7 +86,7 @@ pub use espalier_juxtapose::{Align, Params as JuxtaposeParams};
 pub use espalier_render::ChangeOf;
 pub use espalier_verify::{Check, Outcome};
 pub use espalier_volume::is_dicom_folder;
-pub use event::Event;
+pub use event::{Event, Setting, Took};
 pub use explain::{catalogue, explain};
 pub use group::{GroupRequest, Grouped, group};
 pub use juxtapose::{JuxtaposeRequest, JuxtaposedRuns, juxtapose};

@@ -307,11 +307,13 @@ pub(crate) fn cpu_seconds() -> Option<f64> {
 pub(crate) fn counts(folder: &RunFolder, stage: Stage) -> BTreeMap<String, f64> {
     #[derive(Deserialize)]
     struct Counted {
-        counts: BTreeMap<String, f64>,
+        counts: BTreeMap<String, Option<f64>>,
     }
     let text = folder.text_if_there(&format!("{}/report.json", stage.folder())).ok().flatten();
     let counted = text.and_then(|text| serde_json::from_str::<Counted>(&text).ok());
-    counted.map(|counted| counted.counts).unwrap_or_default()
+    // What is no finite number, JSON has not.
+    let counts = counted.into_iter().flat_map(|counted| counted.counts);
+    counts.map(|(name, value)| (name, value.unwrap_or(f64::NAN))).collect()
 }
 
 #[derive(Serialize)]

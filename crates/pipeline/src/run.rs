@@ -12,17 +12,20 @@ use crate::config::{Config, Loaded, Source, Unit};
 use crate::doctor;
 use crate::error::Error;
 use crate::estimate::{Cost, Sizes};
-use crate::event::Event;
+use crate::event::{Event, Took};
 use crate::failure;
 use crate::folder::{DIGEST_FILE, RunFolder, hex_digest};
 use crate::lock::Patience;
 use crate::provenance::{self, How, StageCost};
 use crate::record::{MadeFrom, Reason, Record};
 use crate::scan_of_map;
-use crate::settings::Settings;
+use crate::settings::{self, Settings};
 use crate::side_file::SideFile;
 use crate::stage::{Artifact, Stage};
 use crate::steps::{self, Step};
+
+/// The second words of the codes of warnings that speak of the input as it lies on the disk.
+const READERS: [&str; 7] = ["VOLUME", "NIFTI", "NRRD", "META", "DICOM", "SWC", "POLYDATA"];
 
 /// A run to be done.
 #[derive(Clone, Debug)]
@@ -107,12 +110,26 @@ fn run_stages(request: &Request, events: &(dyn Fn(Event) + Sync)) -> Result<Summ
         events(Event::Stopped { kept, out: request.out.clone() });
     }
     let digest = done?;
-    let seconds = watch.seconds();
-    events(Event::Ended { seconds, peak_mb: provenance::peak_memory_mb(), n_warnings: run.n_warnings });
     let highlights = stages.last().map(|last| last.writes()).unwrap_or_default();
     let is_highlight = |file: &String| !file.ends_with("/record.json") && folder.path().join(file).exists();
-    let highlights = highlights.into_iter().filter(is_highlight).collect();
+    let highlights: Vec<String> = highlights.into_iter().filter(is_highlight).collect();
+    events(Event::Ended {
+        out: request.out.clone(),
+        files: highlights.clone(),
+        digest: digest.clone(),
+        crossings: crossings(&folder, &stages),
+        seconds: watch.seconds(),
+        peak_mb: provenance::peak_memory_mb(),
+        n_warnings: run.n_warnings,
+    });
     Ok(Summary { out: request.out.clone(), highlights, digest })
+}
+
+/// How many crossings the embedding of a run has, by its certificate; none where the run has not come to one.
+fn crossings(folder: &RunFolder, stages: &[Stage]) -> Option<u64> {
+    let has_embedding = stages.last().is_some_and(|last| *last >= Stage::Embed);
+    let counts = has_embedding.then(|| provenance::counts(folder, Stage::Embed))?;
+    counts.get("crossings").map(|crossings| *crossings as u64)
 }
 
 /// A run that has all it needs, and its stages. Nothing is made yet: a missing input must not leave a folder behind.
@@ -243,6 +260,11 @@ impl Run<'_> {
         self.check_hand_over(folder, stages)?;
         self.take_stock_of_input(stages)?;
         self.foreign = self.foreign(&settings);
+        (self.events)(Event::Opened {
+            out: self.request.out.clone(),
+            stages: stages.to_vec(),
+            settings: settings::changed(&self.request.loaded.config, stages),
+        });
         for &stage in stages {
             if stage == Stage::Report {
                 // It reads the inputs of all stages before, which are in place by now.
@@ -252,9 +274,9 @@ impl Run<'_> {
             let made_from = self.made_from(folder, &settings, stage)?;
             match self.standing(folder, stage, &made_from)? {
                 Ok(record) => self.keep(folder, stage, record)?,
-                Err(_) => match self.shared(stage, &made_from) {
-                    Some(taken) => self.take(folder, &mut settings, (stage, made_from), taken)?,
-                    None => self.make(folder, &mut settings, (stage, made_from))?,
+                Err(reason) => match self.shared(stage, &made_from) {
+                    Some(taken) => self.take(folder, &mut settings, (stage, made_from), (reason, taken))?,
+                    None => self.make(folder, &mut settings, (stage, made_from), reason)?,
                 },
             }
         }
@@ -320,7 +342,8 @@ impl Run<'_> {
         folder.adopt(record.files().clone().into_iter().chain(own));
         self.kept.push(stage);
         self.repeat_warnings(folder, stage)?;
-        (self.events)(Event::Kept { stage, line: record.line });
+        let counts = provenance::counts(folder, stage);
+        (self.events)(Event::Kept { stage, line: record.line, counts });
         Ok(())
     }
 
@@ -328,9 +351,21 @@ impl Run<'_> {
     fn repeat_warnings(&mut self, folder: &RunFolder, stage: Stage) -> Result<(), Error> {
         for (code, message) in provenance::warnings(folder, stage)? {
             self.n_warnings += 1;
-            (self.events)(Event::Warning { stage, code, message });
+            let file = self.file_of_warning(stage, &code);
+            (self.events)(Event::Warning { stage, code, message, file });
         }
         Ok(())
+    }
+
+    /// The user's file that a warning speaks of: the input, where a reader gave the warning.
+    fn file_of_warning(&self, stage: Stage, code: &str) -> Option<PathBuf> {
+        let read = match stage {
+            Stage::Volume => Artifact::Volume,
+            Stage::Tree => Artifact::Traced,
+            _ => return None,
+        };
+        let is_of_reader = code.split('-').nth(1).is_some_and(|word| READERS.contains(&word));
+        self.artifacts.files.get(&read).filter(|_| is_of_reader).cloned()
     }
 
     /// The store that runs share, unless all is to be made again.
@@ -349,7 +384,7 @@ impl Run<'_> {
         folder: &mut RunFolder,
         settings: &mut Settings,
         (stage, made_from): (Stage, MadeFrom),
-        taken: Taken,
+        (reason, taken): (Reason, Taken),
     ) -> Result<(), Error> {
         let watch = Stopwatch::start();
         let Taken { files, line } = taken;
@@ -358,7 +393,8 @@ impl Run<'_> {
         let cost = StageCost { stage, how, seconds, cpu_seconds: None, peak_mb: None, parts: Vec::new() };
         self.note_cost(folder, cost)?;
         self.repeat_warnings(folder, stage)?;
-        (self.events)(Event::Taken { stage, line });
+        let counts = provenance::counts(folder, stage);
+        (self.events)(Event::Taken { stage, reason, line, counts });
         Ok(())
     }
 
@@ -368,9 +404,10 @@ impl Run<'_> {
         folder: &mut RunFolder,
         settings: &mut Settings,
         (stage, made_from): (Stage, MadeFrom),
+        reason: Reason,
     ) -> Result<(), Error> {
         let (config, events) = (&self.request.loaded.config, self.events);
-        events(Event::Started { stage });
+        events(Event::Started { stage, reason });
         let (watch, cpu_before) = (Stopwatch::start(), provenance::cpu_seconds());
         let (source, artifacts) = (&self.source, &mut self.artifacts);
         let mut step = Step { stage, config, source, artifacts, events, folder, parts: Vec::new() };
@@ -383,14 +420,16 @@ impl Run<'_> {
         let record = self.put_in_place(folder, settings, (stage, made_from), (&files, &line))?;
         let (seconds, peak_mb) = (watch.seconds(), provenance::peak_memory_mb());
         let cpu_seconds = provenance::cpu_seconds().zip(cpu_before).map(|(now, before)| now - before);
+        let told = parts.iter().map(|part| (part.name.clone(), part.seconds, part.peak_mb)).collect();
         self.note_cost(folder, StageCost { stage, how: How::Made, seconds, cpu_seconds, peak_mb, parts })?;
         self.share(stage, &record, &files);
         self.n_warnings += report.warnings.len();
         for warning in report.warnings {
-            let code = warning.code.to_owned();
-            events(Event::Warning { stage, code, message: warning.message });
+            let (code, file) = (warning.code.to_owned(), self.file_of_warning(stage, warning.code));
+            events(Event::Warning { stage, code, message: warning.message, file });
         }
-        events(Event::Finished { stage, seconds, line });
+        let counts = report.counts.iter().map(|count| (count.name.to_owned(), count.value)).collect();
+        events(Event::Finished { stage, line, counts, cost: Took { seconds, peak_mb, parts: told } });
         Ok(())
     }
 
@@ -427,7 +466,8 @@ impl Run<'_> {
                 self.is_store_lost = true;
                 self.n_warnings += 1;
                 let message = format!("results are not shared: {error}");
-                (self.events)(Event::Warning { stage, code: "W-RUN-CACHE".to_owned(), message });
+                let code = "W-RUN-CACHE".to_owned();
+                (self.events)(Event::Warning { stage, code, message, file: Some(cache.folder.clone()) });
             }
             Err(_) => {}
         }

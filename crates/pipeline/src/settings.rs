@@ -9,6 +9,7 @@ use toml::{Table, Value};
 
 use crate::config::{Config, UNNAMED};
 use crate::error::Error;
+use crate::event::Setting;
 use crate::folder::RunFolder;
 use crate::side_file::SideFile;
 use crate::stage::Stage;
@@ -137,6 +138,14 @@ pub(crate) fn listed(config: &Config, stages: &[Stage]) -> Vec<(String, String, 
     listed.extend(defaults.into_iter().map(|(key, default)| (key, "not set".to_owned(), Some(default))));
     listed.retain(|(key, ..)| is_shown(key));
     listed
+}
+
+/// The settings of a run that are not at their default.
+pub(crate) fn changed(config: &Config, stages: &[Stage]) -> Vec<Setting> {
+    let seed = (config.seed != 0).then(|| ("seed".to_owned(), config.seed.to_string(), Some("0".to_owned())));
+    let all = seed.into_iter().chain(listed(config, stages));
+    let changed = all.filter(|(_, value, default)| default.as_ref() != Some(value));
+    changed.map(|(key, value, default)| Setting { key, value, default }).collect()
 }
 
 /// Every setting in the text of a resolved config, by dotted key; none where it is no TOML.

@@ -1,6 +1,6 @@
 //! Why a volume cannot be read, or has no mask.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use espalier_model::diagnose::{Class, ParamError};
 use espalier_model::{Diagnose, GridError};
@@ -205,6 +205,15 @@ impl Diagnose for Error {
             Self::AbsentLabel { .. } | Self::NoLabelMap { .. } | Self::NotRegions { .. } => Class::Input,
             Self::Turn(error) => error.class(),
             Self::Empty { .. } | Self::NoTrachea { .. } | Self::NoKnee { .. } => Class::Input,
+        }
+    }
+
+    fn file(&self) -> Option<&Path> {
+        match self {
+            Self::Read { problem: ReadError::Detached { path, .. }, .. } | Self::Read { path, .. } => {
+                Some(path)
+            }
+            _ => None,
         }
     }
 

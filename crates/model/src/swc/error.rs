@@ -178,4 +178,18 @@ impl Diagnose for SwcError {
         }
         .to_owned()
     }
+
+    fn line(&self) -> Option<usize> {
+        match self {
+            Self::Binary { line, .. }
+            | Self::Columns { line, .. }
+            | Self::DecimalComma { line, .. }
+            | Self::Number { line, .. }
+            | Self::Range { line, .. }
+            | Self::DuplicateId { line, .. }
+            | Self::MissingParent { line, .. }
+            | Self::Cycle { line, .. } => Some(*line),
+            Self::Empty { .. } | Self::Scale { .. } | Self::Header { .. } | Self::Tree(_) => None,
+        }
+    }
 }

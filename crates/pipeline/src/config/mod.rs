@@ -13,6 +13,7 @@ mod place;
 mod ranges;
 mod schema;
 mod template;
+mod words;
 
 use std::path::{Path, PathBuf};
 
@@ -87,6 +88,9 @@ impl Default for Config {
 /// The name in every result of a run that nobody has named.
 pub(crate) const UNNAMED: &str = "run";
 
+/// What stands for the name of a config that is only on the command line.
+const COMMAND_LINE: &str = "command line";
+
 /// No config is as large: the longest resolved ones have some kilobytes.
 const MAX_CONFIG_BYTES: u64 = 4 << 20;
 
@@ -134,11 +138,21 @@ impl Loaded {
 pub struct ConfigError {
     rendered: String,
     hint: String,
+    /// The config; none for what the command line says.
+    file: Option<PathBuf>,
+    /// The line of it, from 1.
+    line: Option<usize>,
 }
 
 impl ConfigError {
     fn no_text(path: &Path) -> Box<Self> {
-        Box::new(Self { rendered: format!("{} is not UTF-8 text", path.display()), hint: String::new() })
+        let rendered = format!("{} is not UTF-8 text", path.display());
+        Box::new(Self { rendered, hint: String::new(), file: Some(path.to_owned()), line: None })
+    }
+
+    /// The error of what the command line says.
+    fn of_set(rendered: String, hint: String) -> Box<Self> {
+        Box::new(Self { rendered, hint, file: None, line: None })
     }
 }
 
@@ -153,6 +167,14 @@ impl Diagnose for ConfigError {
 
     fn hint(&self) -> String {
         self.hint.clone()
+    }
+
+    fn file(&self) -> Option<&Path> {
+        self.file.as_deref()
+    }
+
+    fn line(&self) -> Option<usize> {
+        self.line
     }
 }
 
@@ -202,7 +224,7 @@ impl Config {
             toml::Value::from(name),
             toml::Value::from(path.as_ref())
         );
-        Self::parse(&text, Path::new("command line"), overrides)
+        Self::parse(&text, Path::new(COMMAND_LINE), overrides)
     }
 
     /// The name of a run that is given only its input.

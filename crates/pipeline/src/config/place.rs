@@ -8,7 +8,7 @@ use espalier_model::diagnose::ParamError;
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};
 
-use super::{Config, ConfigError, Override};
+use super::{COMMAND_LINE, Config, ConfigError, Override, words};
 
 /// How far a key may be from a legal one to be taken for it.
 const MAX_EDIT_DISTANCE: usize = 3;
@@ -28,7 +28,7 @@ pub(super) struct SourceText<'a> {
 impl SourceText<'_> {
     /// The error of a text that does not parse.
     pub(super) fn parse_error(&self, error: &toml::de::Error) -> Box<ConfigError> {
-        self.at(error.span(), first_line(error.message()), suggestion(error.message()))
+        self.at(error.span(), &words::plain(error.message()), suggestion(error.message()))
     }
 
     /// The error of a value out of range, at `key` in `table` (empty for the top level).
@@ -40,7 +40,7 @@ impl SourceText<'_> {
         {
             let cause = if *key == dotted { error.message.as_str() } else { title.as_str() };
             let rendered = format!("--set {key}={value}: {cause}");
-            return Box::new(ConfigError { rendered, hint: String::new() });
+            return ConfigError::of_set(rendered, String::new());
         }
         self.at(self.find(&dotted), &title, String::new())
     }
@@ -50,12 +50,12 @@ impl SourceText<'_> {
         let mut table: Table = toml::from_str(self.text).map_err(|error| self.parse_error(&error))?;
         for Override { key, value } in self.overrides {
             let in_set = |cause: &str, hint: String| {
-                Box::new(ConfigError { rendered: format!("--set {key}={value}: {cause}"), hint })
+                ConfigError::of_set(format!("--set {key}={value}: {cause}"), hint)
             };
             lay(&mut table, key, parse_value(value)).map_err(|cause| in_set(&cause, String::new()))?;
             // One at a time, so that the one that is wrong is named.
             Config::deserialize_table(&table)
-                .map_err(|error| in_set(first_line(error.message()), suggestion(error.message())))?;
+                .map_err(|error| in_set(&words::plain(error.message()), suggestion(error.message())))?;
         }
         Config::deserialize_table(&table).map_err(|error| self.parse_error(&error))
     }
@@ -71,20 +71,23 @@ impl SourceText<'_> {
 
     fn at(&self, span: Option<Range<usize>>, title: &str, hint: String) -> Box<ConfigError> {
         let path = self.path.display().to_string();
+        let file = (path != COMMAND_LINE).then(|| self.path.to_owned());
         let title: String = title.chars().take(MAX_TITLE).collect();
         let Some(span) = span.filter(|span| span.end <= self.text.len()) else {
-            return Box::new(ConfigError { rendered: format!("{path}: {title}"), hint });
+            return Box::new(ConfigError { rendered: format!("{path}: {title}"), hint, file, line: None });
         };
         let line = self.text[..span.start].matches('\n').count() + 1;
         if span.len() > MAX_SHOWN_LINE || self.longest_line_at(&span) > MAX_SHOWN_LINE {
-            return Box::new(ConfigError { rendered: format!("{path}:{line}: {title}"), hint });
+            let rendered = format!("{path}:{line}: {title}");
+            return Box::new(ConfigError { rendered, hint, file, line: Some(line) });
         }
         let snippet =
             Snippet::source(self.text).path(path.as_str()).annotation(AnnotationKind::Primary.span(span));
         let picture =
             Renderer::plain().render(&[Level::ERROR.primary_title(title.as_str()).element(snippet)]);
         let picture = picture.split_once('\n').map_or("", |(_, rest)| rest);
-        Box::new(ConfigError { rendered: format!("{path}:{line}: {title}\n{picture}"), hint })
+        let rendered = format!("{path}:{line}: {title}\n{picture}");
+        Box::new(ConfigError { rendered, hint, file, line: Some(line) })
     }
 
     /// The bytes of the longest line from that before a place to that after it.
@@ -207,12 +210,6 @@ fn suggestion(message: &str) -> String {
     )
 }
 
-/// The first line; of an unknown name without the list of legal ones, which the hint has.
-fn first_line(message: &str) -> &str {
-    let line = message.lines().next().unwrap_or_default();
-    if line.starts_with("unknown") { line.split(", expected").next().unwrap_or(line) } else { line }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -250,7 +247,7 @@ w_angle = -1
         let no_weight = TEXT.replace("w_angle = -1\n", "");
         refused(&no_weight, &[], &["a.toml:7: embed.weights[1]: says no weight"]);
         let typo = TEXT.replace("w_angle", "w_angel");
-        refused(&typo, &[], &["a.toml:9: unknown field `w_angel`"]);
+        refused(&typo, &[], &["a.toml:9: unknown key `w_angel`"]);
         let inverted = TEXT.replace("[0, 2]", "[2, 0]").replace("-1", "1");
         refused(&inverted, &[], &["a.toml:5: embed.weights[0].generations", "is [2, 0]"]);
         let nowhere = TEXT.replace("branches = [3, 7]\n", "").replace("-1", "1");

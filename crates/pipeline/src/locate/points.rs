@@ -90,6 +90,10 @@ impl Diagnose for PointError {
     fn hint(&self) -> String {
         "write X,Y,Z in RAS+ mm for a point of the patient, U,V in mm for one of the map".to_owned()
     }
+
+    fn line(&self) -> Option<usize> {
+        if let Self::Line { line, .. } = self { Some(*line) } else { None }
+    }
 }
 
 /// Beyond this nothing of a body lies, in mm, voxels or pixels.
