@@ -3,21 +3,25 @@
 mod comparison;
 mod file;
 mod losses;
+mod nodes;
 mod runs;
 mod widths;
 
 use glam::DVec2;
+use serde::{Deserialize, Serialize};
 
 pub use comparison::{CompareCell, CompareColumn, ComparedLayout, Comparison, compare_columns};
-pub use file::NODE_COLUMNS;
 pub use losses::{Better, LossColumn, Losses};
+pub use nodes::NODE_COLUMNS;
 pub use runs::{ComparedRun, ComparedRuns, RUN_COLUMN};
 pub use widths::{WidthMode, Widths};
 
 use crate::edits::Edit;
+use file::EditRecordFile;
 
 /// Where target angles come from (section 3.2.1 of [Hu2022]).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum TargetKind {
     /// The exact angle in three dimensions; the local plane only tells the side.
     #[default]
@@ -53,13 +57,15 @@ impl TargetKind {
 
 /// What an embedding aims at, by node; frozen before any method runs, and in the handedness of the global view: in
 /// a picture that is reflected (see [`Pose`]) angles run the other way round.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Targets {
     /// How they were made.
     pub kind: TargetKind,
     /// The target node angle θ in (0, 2π): counter-clockwise from (parent → grandparent) to (parent → node),
     /// π = straight. For a child of the root the grandparent is virtual, in the middle of the largest gap, and
     /// no loss is counted. `NaN` for the root.
+    #[serde(with = "file::none_for_nan")]
     pub angle_rad: Vec<f64>,
     /// The target edge length: the length in three dimensions, in mm. 0 for the root.
     pub length_mm: Vec<f64>,
@@ -70,7 +76,8 @@ pub struct Targets {
 }
 
 /// The one energy by which every method is judged (section 3.2.2 of [Hu2022], Eq. 4), by parts.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Energy {
     /// Σ over branches of w_l · mean r_l².
     pub length: f64,
@@ -93,7 +100,8 @@ impl Energy {
 }
 
 /// The statement that an embedding has no crossings, or where it has them: exact, over the written coordinates.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Certificate {
     /// How many pairs of edges have a point in common that they should not have.
     pub crossings: usize,
@@ -114,7 +122,8 @@ impl Certificate {
 
 /// The rigid motion (and mirror) of the whole that was applied last. It costs no energy and no loss: all of them
 /// are those of the layout before it was reflected.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Pose {
     /// Rotation counter-clockwise in radians, applied after the reflection.
     pub rotation_rad: f64,
@@ -123,7 +132,8 @@ pub struct Pose {
 }
 
 /// Why an optimisation ended.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Termination {
     /// Nothing to optimise, or a constructive method.
     #[default]
@@ -137,7 +147,8 @@ pub enum Termination {
 }
 
 /// What a method had just done when a point of its convergence curve was taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Phase {
     /// Nothing: the layout that it begins with.
     Start,
@@ -166,7 +177,8 @@ impl Phase {
 }
 
 /// One point of a convergence curve.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct TracePoint {
     /// What has just been done.
     pub phase: Phase,
@@ -181,7 +193,8 @@ pub struct TracePoint {
 }
 
 /// One method's row in `compare.tsv`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct MethodRow {
     /// The method's name, such as `radial`, with its size where that matters.
     pub method: String,
@@ -200,7 +213,8 @@ pub struct MethodRow {
 }
 
 /// A manual edit and what came of it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "EditRecordFile", into = "EditRecordFile")]
 pub struct EditRecord {
     /// What was asked for.
     pub edit: Edit,
@@ -221,7 +235,7 @@ pub struct EditRecord {
 ///
 /// **Guarantees** one entry per node of its tree in every per-node vector; positions are finite and rounded to
 /// `quantum_mm`, exactly as they are written; the certificate is for these numbers.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Embedding {
     /// The digest of its tree: [`Tree::digest`](crate::Tree::digest).
     pub tree: String,
@@ -229,33 +243,33 @@ pub struct Embedding {
     pub method: String,
     /// The seed it was made with.
     pub seed: u64,
-    /// Where each node lies, plane mm: x to the right, y up.
-    pub positions_mm: Vec<DVec2>,
-    /// The step to which coordinates are rounded, a power of ten, in mm.
-    pub quantum_mm: f64,
     /// The targets.
     pub targets: Targets,
-    /// r_l of each node's edge; 0 for the root.
-    pub length_ratio: Vec<f64>,
-    /// r_a of each node; 0 for the root and its children.
-    pub angle_ratio: Vec<f64>,
-    /// The one energy.
-    pub energy: Energy,
-    /// The losses.
-    pub losses: Losses,
+    /// Why it ended.
+    pub termination: Termination,
+    /// The step to which coordinates are rounded, a power of ten, in mm.
+    pub quantum_mm: f64,
+    /// The last rigid motion.
+    pub pose: Pose,
     /// The certificate.
     pub certificate: Certificate,
     /// What is known of it at the widths of the tubes.
     pub widths: Widths,
-    /// The last rigid motion.
-    pub pose: Pose,
-    /// Why it ended.
-    pub termination: Termination,
-    /// The convergence curve of the method that was asked for, whether or not its layout won; empty if it does not
-    /// search.
-    pub trace: Vec<TracePoint>,
+    /// The one energy.
+    pub energy: Energy,
+    /// The losses.
+    pub losses: Losses,
     /// All methods that ran, scored alike, this one among them.
     pub methods: Vec<MethodRow>,
     /// The manual edits that were made after them, in order; none as a rule.
     pub edits: Vec<EditRecord>,
+    /// The convergence curve of the method that was asked for, whether or not its layout won; empty if it does not
+    /// search.
+    pub trace: Vec<TracePoint>,
+    /// Where each node lies, plane mm: x to the right, y up.
+    pub positions_mm: Vec<DVec2>,
+    /// r_l of each node's edge; 0 for the root.
+    pub length_ratio: Vec<f64>,
+    /// r_a of each node; 0 for the root and its children.
+    pub angle_ratio: Vec<f64>,
 }

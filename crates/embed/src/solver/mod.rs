@@ -9,7 +9,7 @@
 //! | | `shape`, `work` | a layout by its ratios; the budget |
 //! | | `linkage`, `joint`, `deviation` | a layout as a linkage: what a change of some ratios moves, gains and hits |
 //! | | `placement` | the placement term while subtrees turn |
-//! | | `hierarchy`, `similarity` | who may be near whom: boxes over subtrees that move as a whole |
+//! | | `hierarchy`, `oriented_box`, `similarity` | who may be near whom: boxes over subtrees that move as a whole |
 //! | | `repair` | manual edits: a layout of which a part is pinned, freed of crossings |
 //!
 //! **Input** the problem, and crossing-free headings. **Output** a layout without crossings, why the search ended,
@@ -38,6 +38,7 @@ mod hierarchy;
 mod joint;
 mod linkage;
 pub(crate) mod mirrors;
+mod oriented_box;
 mod placement;
 mod repair;
 mod shape;

@@ -7,7 +7,7 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::file::{self, MethodRowFile, TracePointFile};
+use super::file;
 use super::losses::{Better, Losses};
 use super::{MethodRow, TargetKind, TracePoint};
 use crate::table::{Column, Digits, Table};
@@ -22,7 +22,7 @@ const VERSION: u32 = 2;
 ///
 /// **Guarantees** one position per node of its tree in each layout, finite and rounded to its `quantum_mm`, exactly as
 /// they are written; `chosen` is the index of a layout.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
     /// The digest of the tree: [`Tree::digest`].
     pub tree: String,
@@ -37,16 +37,17 @@ pub struct Comparison {
 }
 
 /// One method's layout and its row.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ComparedLayout {
     /// Its row in `compare.tsv`.
     pub row: MethodRow,
     /// The step to which coordinates are rounded, a power of ten, in mm.
     pub quantum_mm: f64,
-    /// Where each node lies, plane mm: x to the right, y up.
-    pub positions_mm: Vec<DVec2>,
     /// Its convergence curve, best so far; empty for a method that does not search.
     pub trace: Vec<TracePoint>,
+    /// Where each node lies, plane mm: x to the right, y up.
+    pub positions_mm: Vec<DVec2>,
 }
 
 /// A cell of `compare.tsv`.
@@ -204,42 +205,11 @@ impl MethodRow {
     }
 }
 
-#[derive(Serialize, Deserialize)]
-struct ComparisonFile {
-    tree: String,
-    targets: String,
-    seed: u64,
-    chosen: usize,
-    layouts: Vec<ComparedLayoutFile>,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ComparedLayoutFile {
-    row: MethodRowFile,
-    quantum_mm: f64,
-    trace: Vec<TracePointFile>,
-    positions_mm: Vec<[f64; 2]>,
-}
-
 impl Comparison {
     /// The text of `compare.json`.
     #[must_use]
     pub fn to_json(&self) -> String {
-        let layout = |layout: &ComparedLayout| ComparedLayoutFile {
-            row: (&layout.row).into(),
-            quantum_mm: layout.quantum_mm,
-            trace: layout.trace.iter().copied().map(Into::into).collect(),
-            positions_mm: layout.positions_mm.iter().map(DVec2::to_array).collect(),
-        };
-        let file = ComparisonFile {
-            tree: self.tree.clone(),
-            targets: self.targets.clone(),
-            seed: self.seed,
-            chosen: self.chosen,
-            layouts: self.layouts.iter().map(layout).collect(),
-        };
-        versioned::to_json(FORMAT, VERSION, file)
+        versioned::to_json(FORMAT, VERSION, self)
     }
 
     /// The comparison of layouts of `tree` in a text of `compare.json`.
@@ -247,32 +217,24 @@ impl Comparison {
     /// # Errors
     /// [`FileError`] if the text is not such a file, was made for another tree, or breaks a guarantee.
     pub fn from_json(text: &str, tree: &Tree) -> Result<Self, FileError> {
-        let file: ComparisonFile = versioned::from_json(FORMAT, VERSION, text)?;
-        versioned::check_tree(FORMAT, &file.tree, tree)?;
-        check(&file, tree.n_nodes()).map_err(|what| FileError::Invalid { format: FORMAT, what })?;
-        let layout = |layout: ComparedLayoutFile| ComparedLayout {
-            row: layout.row.into(),
-            quantum_mm: layout.quantum_mm,
-            positions_mm: layout.positions_mm.into_iter().map(DVec2::from_array).collect(),
-            trace: layout.trace.into_iter().map(Into::into).collect(),
-        };
-        Ok(Self {
-            tree: file.tree,
-            targets: file.targets,
-            seed: file.seed,
-            chosen: file.chosen,
-            layouts: file.layouts.into_iter().map(layout).collect(),
-        })
+        let comparison: Self = versioned::from_json(FORMAT, VERSION, text)?;
+        versioned::check_tree(FORMAT, &comparison.tree, tree)?;
+        check(&comparison, tree.n_nodes()).map_err(|what| FileError::Invalid { format: FORMAT, what })?;
+        Ok(comparison)
     }
 }
 
-fn check(file: &ComparisonFile, n_nodes: usize) -> Result<(), String> {
-    if file.chosen >= file.layouts.len() {
-        return Err(format!("chosen is {}, there are {} layouts", file.chosen, file.layouts.len()));
+fn check(comparison: &Comparison, n_nodes: usize) -> Result<(), String> {
+    if comparison.chosen >= comparison.layouts.len() {
+        return Err(format!(
+            "chosen is {}, there are {} layouts",
+            comparison.chosen,
+            comparison.layouts.len()
+        ));
     }
-    file.layouts.iter().try_for_each(|layout| {
+    comparison.layouts.iter().try_for_each(|layout| {
         file::check_positions(&layout.positions_mm, layout.quantum_mm, n_nodes)
-            .map_err(|what| format!("layout of {}: {what}", layout.row.method()))
+            .map_err(|what| format!("layout of {}: {what}", layout.row.method))
     })
 }
 

@@ -35,27 +35,10 @@ macro_rules! losses {
     ($( $name:ident, $unit:literal, $digits:expr, $better:ident, $meaning:literal; )*) => {
         /// What a layout loses (section 5.1.1 of [Hu2022], and more). Means are over what has the quantity; where
         /// nothing has it, they are 0.
-        #[derive(Clone, Copy, Debug, Default, PartialEq)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields)]
         pub struct Losses {
             $( #[doc = $meaning] pub $name: f64, )*
-        }
-
-        #[derive(Clone, Copy, Serialize, Deserialize)]
-        #[serde(deny_unknown_fields)]
-        pub(super) struct LossesFile {
-            $( $name: f64, )*
-        }
-
-        impl From<Losses> for LossesFile {
-            fn from(losses: Losses) -> Self {
-                Self { $( $name: losses.$name, )* }
-            }
-        }
-
-        impl From<LossesFile> for Losses {
-            fn from(file: LossesFile) -> Self {
-                Self { $( $name: file.$name, )* }
-            }
         }
 
         impl Losses {

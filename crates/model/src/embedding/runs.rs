@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 
 use super::MethodRow;
 use super::comparison::compare_columns;
-use super::file::MethodRowFile;
 use crate::table::{Column, Table};
 use crate::versioned::{self, FileError};
 
@@ -18,11 +17,15 @@ const VERSION: u32 = 1;
 pub const RUN_COLUMN: Column = Column::new("run", "n/a", "the run");
 
 /// The rows of several runs.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ComparedRuns(pub Vec<ComparedRun>);
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ComparedRuns {
+    /// One entry per run.
+    pub runs: Vec<ComparedRun>,
+}
 
 /// The rows of a run.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ComparedRun {
     /// What the run is called.
     pub name: String,
@@ -38,22 +41,6 @@ pub struct ComparedRun {
     pub rows: Vec<MethodRow>,
 }
 
-#[derive(Serialize, Deserialize)]
-struct RunsFile {
-    runs: Vec<RunFile>,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RunFile {
-    name: String,
-    tree: String,
-    targets: String,
-    seed: u64,
-    chosen: usize,
-    rows: Vec<MethodRowFile>,
-}
-
 impl ComparedRuns {
     /// The table `compare.tsv` of a comparison of runs.
     #[must_use]
@@ -62,7 +49,7 @@ impl ComparedRuns {
         let names: Vec<Column> =
             std::iter::once(RUN_COLUMN).chain(columns.iter().map(|column| column.column)).collect();
         let mut table = Table::with(&names);
-        for run in &self.0 {
+        for run in &self.runs {
             for row in &run.rows {
                 let cells = columns.iter().map(|column| column.text(row));
                 table.row_of(&std::iter::once(run.name.clone()).chain(cells).collect::<Vec<_>>());
@@ -74,15 +61,7 @@ impl ComparedRuns {
     /// The text of `compare.json` of a comparison of runs.
     #[must_use]
     pub fn to_json(&self) -> String {
-        let run = |run: &ComparedRun| RunFile {
-            name: run.name.clone(),
-            tree: run.tree.clone(),
-            targets: run.targets.clone(),
-            seed: run.seed,
-            chosen: run.chosen,
-            rows: run.rows.iter().map(Into::into).collect(),
-        };
-        versioned::to_json(FORMAT, VERSION, RunsFile { runs: self.0.iter().map(run).collect() })
+        versioned::to_json(FORMAT, VERSION, self)
     }
 
     /// The rows in a text of such a file.
@@ -90,18 +69,15 @@ impl ComparedRuns {
     /// # Errors
     /// [`FileError`] if the text is not such a file.
     pub fn from_json(text: &str) -> Result<Self, FileError> {
-        let file: RunsFile = versioned::from_json(FORMAT, VERSION, text)?;
-        let run = |run: RunFile| {
-            if run.chosen >= run.rows.len() {
+        let runs: Self = versioned::from_json(FORMAT, VERSION, text)?;
+        match runs.runs.iter().find(|run| run.chosen >= run.rows.len()) {
+            Some(run) => {
                 let what =
                     format!("{}: chosen is {}, there are {} rows", run.name, run.chosen, run.rows.len());
-                return Err(FileError::Invalid { format: FORMAT, what });
+                Err(FileError::Invalid { format: FORMAT, what })
             }
-            let rows = run.rows.into_iter().map(Into::into).collect();
-            let RunFile { name, tree, targets, seed, chosen, .. } = run;
-            Ok(ComparedRun { name, tree, targets, seed, chosen, rows })
-        };
-        file.runs.into_iter().map(run).collect::<Result<_, _>>().map(Self)
+            None => Ok(runs),
+        }
     }
 }
 
@@ -129,12 +105,12 @@ mod tests {
             chosen,
             rows: vec![row.clone(), row.clone()],
         };
-        let runs = ComparedRuns(vec![run("a", 0), run("b", 1)]);
+        let runs = ComparedRuns { runs: vec![run("a", 0), run("b", 1)] };
         assert_eq!(ComparedRuns::from_json(&runs.to_json()).expect("our own file"), runs);
         let tsv = runs.to_tsv();
         assert!(tsv.starts_with("run\tmethod\tcrossings\t") && tsv.contains("\nb\tradial\t0\t2\t0.300000\t"));
         assert_eq!(tsv.lines().count(), 5);
-        let broken = ComparedRuns(vec![run("c", 2)]);
+        let broken = ComparedRuns { runs: vec![run("c", 2)] };
         let error = ComparedRuns::from_json(&broken.to_json()).expect_err("refused");
         assert!(error.to_string().contains("c: chosen is 2, there are 2 rows"), "{error}");
     }

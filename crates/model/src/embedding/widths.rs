@@ -1,7 +1,10 @@
 //! What is known of a layout at the widths of its tubes.
 
+use serde::{Deserialize, Serialize};
+
 /// What to do about tubes that overlap although their centrelines do not cross.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum WidthMode {
     /// Nothing: the layout of centrelines stays, what overlaps is said.
     #[default]
@@ -13,7 +16,8 @@ pub enum WidthMode {
 }
 
 /// A layout at the widths of its tubes.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Widths {
     /// What was done about overlaps.
     pub mode: WidthMode,

@@ -219,7 +219,7 @@ pub(crate) fn check_crossings(tree: &Tree, comparison: &Comparison, path: &Path)
 pub(crate) type Files = Vec<(String, Vec<u8>)>;
 
 fn results(request: &CompareRequest, runs: &[Found]) -> Result<(ComparedRuns, Files), Error> {
-    let rows = ComparedRuns(runs.iter().map(rows_of).collect());
+    let rows = ComparedRuns { runs: runs.iter().map(rows_of).collect() };
     let mut params = runs.first().map(|run| run.config.render.clone()).unwrap_or_default();
     params.title.get_or_insert_with(|| match runs {
         [only] => only.name.clone(),

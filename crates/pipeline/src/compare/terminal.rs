@@ -48,9 +48,9 @@ clear: least distance of edges, in median edges   backw: length that points back
 
 /// The table; `seconds` has the methods of each run with their time.
 pub(crate) fn table(runs: &ComparedRuns, seconds: &[&[(String, f64)]]) -> String {
-    let has_names = runs.0.len() > 1;
+    let has_names = runs.runs.len() > 1;
     let mut lines = vec![heads(has_names)];
-    for (run, seconds) in runs.0.iter().zip(seconds) {
+    for (run, seconds) in runs.runs.iter().zip(seconds) {
         for (row_idx, row) in run.rows.iter().enumerate() {
             let chosen = if row_idx == run.chosen { "> " } else { "  " };
             let mut cells = if has_names { vec![run.name.clone()] } else { Vec::new() };
@@ -90,7 +90,7 @@ fn marked(runs: &ComparedRuns, run: &ComparedRun, row: &MethodRow, column: &Show
     // A run may hold a layout that is scored against other targets than the embedding.
     let kind = run.rows.get(run.chosen).map(|chosen| chosen.targets);
     let compares = |row: &&MethodRow| row.crossings == 0 && Some(row.targets) == kind;
-    let mut rivals = runs.0.iter().filter(is_rival).flat_map(|run| &run.rows).filter(compares);
+    let mut rivals = runs.runs.iter().filter(is_rival).flat_map(|run| &run.rows).filter(compares);
     let is_best = match column.better {
         Better::Neither => false,
         Better::Less => rivals.all(|rival| own <= number(&(column.text)(rival))),
@@ -152,11 +152,12 @@ mod tests {
 
     #[test]
     fn the_best_without_crossings_is_marked_among_its_like() {
-        let runs = ComparedRuns(vec![
+        let runs = vec![
             run("a", "t", vec![row("projection", 3, 0.1), row("radial", 0, 0.4)]),
             run("b", "t", vec![row("cone", 0, 0.300_1), row("solver", 0, 0.299_9)]),
             run("c", "u", vec![row("cone", 0, 0.9), row("pso", 0, 0.95)]),
-        ]);
+        ];
+        let runs = ComparedRuns { runs };
         let seconds = [("radial".to_owned(), 1.5)];
         let text = table(&runs, &[&seconds, &[], &[]]);
         let lines: Vec<&str> = text.lines().collect();
@@ -173,7 +174,8 @@ mod tests {
     #[test]
     fn a_layout_for_other_targets_is_no_rival() {
         let other = MethodRow { targets: TargetKind::IntrinsicMirrored, ..row("pso", 0, 0.1) };
-        let runs = ComparedRuns(vec![run("a", "t", vec![other, row("cone", 0, 0.3), row("radial", 0, 0.4)])]);
+        let runs = vec![run("a", "t", vec![other, row("cone", 0, 0.3), row("radial", 0, 0.4)])];
+        let runs = ComparedRuns { runs };
         let text = table(&runs, &[&[]]);
         let line = |method: &str| text.lines().find(|line| line.contains(method)).expect("a line").to_owned();
         assert!(line("pso").contains("0.100 ") && !line("pso").contains('*'), "{text}");
