@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use espalier_model::Diagnose;
 use espalier_model::diagnose::Class;
-use espalier_pipeline::{Check, Error, Outcome, Override, verify};
-use espalier_tests::{run, set, small_swarm};
+use espalier_pipeline::{Check, Error, GroupRequest, Outcome, Override, Stage, group as group_of, verify};
+use espalier_tests::{run, run_range, set, small_swarm};
 use tempfile::TempDir;
 
 /// A run of the fixture neuron.
@@ -208,22 +208,27 @@ fn what_cannot_be_read_is_said_so() {
     // Malformed, and sealed as if it were right; only altered; a coordinate with digits too many.
     let cut = |text: &str| text[..text.len() / 2].to_owned();
     let sealed = tampered(original.path(), "embedding.json", true, cut);
-    assert_eq!(class(sealed.path()), Class::Input);
+    assert_eq!(class(sealed.path()), Class::Uncertified);
+    assert_eq!(failures(sealed.path()), ["embedding.json: readable"]);
     let altered = tampered(original.path(), "embedding.json", false, cut);
     assert_eq!(class(altered.path()), Class::Uncertified);
     assert!(failures(altered.path()).contains(&"embedding.json: readable".to_owned()));
     let version = |text: &str| text.replacen("\"version\":", "\"version\":9", 1);
     let later = tampered(original.path(), "embedding.json", true, version);
-    let error = verify(later.path(), Some(1)).expect_err("unknown version");
-    assert_eq!((error.code(), error.class()), ("E-FILE-VERSION", Class::Input));
+    assert_eq!(failures(later.path()), ["embedding.json: readable"]);
+    let error = verify(later.path(), Some(1)).expect("a folder").verdict().expect_err("unknown version");
+    assert!(error.to_string().contains("version 93, expected"), "{error}");
 
     // Another tree under the same name.
     let tree = |text: &str| text.replacen(" 3 ", " 2 ", 1);
     let other = tampered(original.path(), "tree.swc", true, tree);
     assert!(failures(other.path()).contains(&"embedding.json: tree".to_owned()));
 
-    let absent =
-        [("nodes.tsv", Class::Uncertified), ("tree.swc", Class::Uncertified), ("SHA256SUMS", Class::Io)];
+    let absent = [
+        ("nodes.tsv", Class::Uncertified),
+        ("tree.swc", Class::Uncertified),
+        ("SHA256SUMS", Class::Uncertified),
+    ];
     for (file, expected) in absent {
         let copy = tempfile::tempdir().expect("temporary folder");
         copy_folder(original.path(), copy.path());
@@ -237,6 +242,76 @@ fn what_cannot_be_read_is_said_so() {
     let unsealed = tampered(original.path(), "SHA256SUMS", false, without);
     assert_eq!(failures(unsealed.path()), ["planar.png: sealed"]);
     let sums = tampered(original.path(), "SHA256SUMS", false, |text| format!("{text}no digest\n"));
-    assert_eq!(class(sums.path()), Class::Input);
+    assert_eq!(class(sums.path()), Class::Uncertified);
+    let error = verify(sums.path(), Some(1)).expect_err("a line that is none");
+    assert!(error.code() == "E-VERIFY-MALFORMED" && error.line() > Some(10), "{error}");
+    let nothing = tampered(original.path(), "SHA256SUMS", false, |_| String::new());
+    assert!(verify(nothing.path(), Some(1)).is_err_and(|error| error.to_string().contains("names no file")));
     assert!(matches!(verify(&PathBuf::from("no/such/folder"), None), Err(Error::Read { .. })));
+}
+
+/// A run that was asked for no more than a part is held against itself as far as it has come.
+#[test]
+fn what_a_run_has_not_come_to_is_untested() {
+    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/y.nii.gz");
+    for (last, untested) in [
+        (Stage::Skeleton, ["tree.swc", "views.json", "embedding.json"].as_slice()),
+        (Stage::Tree, &["views.json", "embedding.json"]),
+        (Stage::Views, &["embedding.json"]),
+        (Stage::Embed, &[]),
+    ] {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        run_range(&fixture, folder.path(), &small_swarm(), (None, Some(last))).expect("a run");
+        let verification = verify(folder.path(), Some(2)).expect("a readable folder");
+        assert_eq!(failures(folder.path()), [""; 0], "{last}");
+        let is_untested = |check: &Check| check.outcome == Outcome::Untested && check.name == "results";
+        let found = verification.checks.iter().filter(|(_, check)| is_untested(check));
+        assert_eq!(found.map(|(file, _)| file.as_str()).collect::<Vec<_>>(), untested, "{last}");
+        // What it has come to is not to be taken away unseen.
+        let mask = "stages/01-volume/mask.nii.gz";
+        fs::remove_file(folder.path().join(mask)).expect("remove");
+        assert_eq!(failures(folder.path()), [format!("{mask}: sha256")]);
+    }
+}
+
+/// A folder that has run folders in it stands for all of them; a folder of a group or a comparison for itself.
+#[test]
+fn folders_of_runs_and_of_pages_are_verified() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let at = |name: &str| folder.path().join(name);
+    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/neuron.swc");
+    for name in ["runs/a", "runs/b"] {
+        run(&fixture, &at(name), &small_swarm(), 2).expect("a run");
+    }
+    let group = GroupRequest {
+        folders: vec![at("runs")],
+        out: at("group"),
+        title: None,
+        is_anonymous: false,
+        threads: Some(2),
+    };
+    group_of(&group).expect("a page");
+    assert_eq!(failures(&at("group")), [""; 0]);
+    let page = verify(&at("group"), Some(1)).expect("a folder");
+    assert!(page.checks.iter().any(|(file, check)| file == "group.tsv" && check.name == "columns"));
+
+    // A run that stopped before it had a result takes nothing from the others.
+    fs::create_dir_all(at("runs/c/provenance")).expect("folder");
+    let failure = "{\"format\":\"espalier-failure\",\"version\":1,\"stage\":null,\"code\":\"E-IO-READ\",\"reason\":\"x\"}";
+    fs::write(at("runs/c/provenance/failure.json"), failure).expect("write");
+    let whole = verify(folder.path(), Some(2)).expect("a folder");
+    whole.verdict().expect("claims that hold");
+    let has =
+        |file: &str, name: &str| whole.checks.iter().any(|(of, check)| of == file && check.name == name);
+    assert!(has("runs/a/tree.swc", "sha256") && has("runs/b/compare.tsv", "methods"));
+    assert!(has("group/group.html", "sha256") && has("runs/c", "results"));
+
+    fs::write(at("runs/b/planar.svg"), "altered").expect("write");
+    assert_eq!(failures(folder.path()), ["runs/b/planar.svg: sha256"]);
+    fs::write(at("group/group.tsv"), "label\n").expect("write");
+    assert!(failures(&at("group")).contains(&"group.tsv: sha256".to_owned()));
+    // Results whose list is gone are no reason to look elsewhere.
+    fs::remove_file(at("runs/a/SHA256SUMS")).expect("remove");
+    let error = verify(folder.path(), Some(1)).expect_err("results without a list");
+    assert!(error.file().is_some_and(|file| file.ends_with("runs/a/SHA256SUMS")), "{error}");
 }

@@ -255,7 +255,8 @@ pub(crate) struct RunArguments {
 /// How a command deals with a run folder that is in use.
 #[derive(Clone, Copy, Debug, Args)]
 pub(crate) struct Rerun {
-    /// Do stages again also where their results stand: made from the same files and settings, and not altered since
+    /// Do stages again also where their results stand: made from the same files and settings, and not altered since; and
+    /// write over files that no run has made
     #[arg(long)]
     pub(crate) force: bool,
     /// Wait for another run that holds the folder, rather than to stop with exit code 75

@@ -59,7 +59,7 @@ fn of_configs_and_run_folders() {
     raises(&at, &["embed", "out/tree.swc", "views.json", "-o", "e"], "E-FILE-INVALID", 3);
     // A folder stands where a result should go.
     fs::create_dir_all(at.path().join("full/tree.swc/inside")).expect("folder");
-    raises(&at, &["run", "tree.swc", "-o", "full"], "E-IO-WRITE", 74);
+    raises(&at, &["run", "tree.swc", "-o", "full"], "E-RUN-IN-WAY", 73);
     let swarm = ["--set", "embed.pso.memory_mib=1", "--set", "embed.pso.particles=100000"];
     raises(&at, &[&["run", "tree.swc", "-o", "swarm"], &swarm[..]].concat(), "E-EMBED-MEMORY", 5);
 }

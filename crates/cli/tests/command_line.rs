@@ -297,8 +297,18 @@ fn verify_prints_a_table_and_fails_where_a_claim_does() {
     fs::remove_file(folder.path().join("out/nodes.tsv")).expect("remove");
     refused(&folder, &["verify", "out"], 8, &["error[E-VERIFY]"]);
     fs::write(folder.path().join("out/SHA256SUMS"), "no digest\n").expect("write");
-    refused(&folder, &["verify", "out"], 3, &["error[E-VERIFY-MALFORMED]", "SHA256SUMS", "line 1"]);
-    refused(&folder, &["verify", "nowhere"], 74, &["SHA256SUMS"]);
+    refused(&folder, &["verify", "out"], 8, &["error[E-VERIFY-MALFORMED]", "out/SHA256SUMS", "line 1"]);
+    fs::remove_file(folder.path().join("out/SHA256SUMS")).expect("remove");
+    refused(&folder, &["verify", "out"], 8, &["error[E-VERIFY-MALFORMED]", "out/SHA256SUMS", "no such file"]);
+    refused(&folder, &["verify", "."], 8, &["error[E-VERIFY-MALFORMED]", "out/SHA256SUMS"]);
+    fs::create_dir(folder.path().join("empty")).expect("folder");
+    refused(
+        &folder,
+        &["verify", "empty"],
+        8,
+        &["error[E-VERIFY-MALFORMED]", "empty/SHA256SUMS", "run folder"],
+    );
+    refused(&folder, &["verify", "nowhere"], 74, &["error[E-IO-READ]", "nowhere"]);
 }
 
 /// The baseline of a view that a file says: of a `views.json`, of two vectors, of nothing that is one.

@@ -234,6 +234,18 @@ pub enum Error {
         /// The input.
         path: PathBuf,
     },
+    /// A file that no run has made, and that a result would be written over.
+    #[error("{path} was not made by a run here, and a result of that name would take its place", path = path.display())]
+    FileInTheWay {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A folder where a result should go.
+    #[error("{path} is a folder, and a result of that name is to be written", path = path.display())]
+    FolderInTheWay {
+        /// The folder.
+        path: PathBuf,
+    },
     /// A text that is no point.
     #[error("{source_name}{cause}", source_name = source_name.as_ref().map(|name| format!("{name}: ")).unwrap_or_default())]
     Point {
@@ -433,6 +445,7 @@ impl Diagnose for Error {
             Self::NoSuchPlace { .. } => "E-PROFILE-PLACE",
             Self::PlotFormat { .. } | Self::ResultInTheWay { .. } => "E-PROFILE-PLOT",
             Self::InputInTheWay { .. } => "E-RUN-INPUT-IN-WAY",
+            Self::FileInTheWay { .. } | Self::FolderInTheWay { .. } => "E-RUN-IN-WAY",
             Self::Point { cause, .. } => cause.code(),
             Self::NoSuchSpace { .. } => "E-LOCATE-SPACE",
             Self::NoRun { .. } => "E-COMPARE-NO-RUN",
@@ -510,7 +523,10 @@ impl Diagnose for Error {
             | Self::Print { .. } => Class::Io,
             Self::Altered { .. } | Self::Certificate { .. } | Self::Unverified { .. } => Class::Uncertified,
             Self::TooLarge { .. } | Self::Memory { .. } => Class::Limit,
-            Self::Create { .. } | Self::BidsOutput { .. } => Class::CannotCreate,
+            Self::Create { .. }
+            | Self::FileInTheWay { .. }
+            | Self::FolderInTheWay { .. }
+            | Self::BidsOutput { .. } => Class::CannotCreate,
             Self::Locked { .. } => Class::Locked,
         }
     }
@@ -525,6 +541,10 @@ impl Diagnose for Error {
             Self::PlotFormat { .. } => "name it with one of these endings".to_owned(),
             Self::ResultInTheWay { .. } => "choose another name for the plot".to_owned(),
             Self::InputInTheWay { .. } => "choose another folder with -o".to_owned(),
+            Self::FileInTheWay { .. } => {
+                "move it away, or choose another folder with -o; --force writes over it".to_owned()
+            }
+            Self::FolderInTheWay { .. } => "move it away, or choose another folder with -o".to_owned(),
             Self::Point { cause, .. } => cause.hint(),
             Self::NoSuchSpace { .. } => "give points in RAS+ mm, with --lps in LPS+ mm, or on the map in mm".to_owned(),
             Self::NoRun { .. } => "run it with this version, at least up to --to embed".to_owned(),
@@ -585,7 +605,7 @@ impl Diagnose for Error {
             Self::Memory { .. } => {
                 "allow more with --max-memory, or take coarser voxels with volume.resample_mm".to_owned()
             }
-            Self::Create { .. } => "choose another folder with -o".to_owned(),
+            Self::Create { .. } => "choose another place for it with -o (a plot: with --plot)".to_owned(),
             Self::Write { .. } => "check the free space and the permissions of the folder".to_owned(),
             Self::Print { .. } => "what was done is in place; send standard output to where there is room".to_owned(),
             Self::Locked { .. } => "wait for it with --wait, or choose another folder with -o".to_owned(),
@@ -609,6 +629,8 @@ impl Diagnose for Error {
             | Self::PlotFormat { path }
             | Self::ResultInTheWay { path }
             | Self::InputInTheWay { path }
+            | Self::FileInTheWay { path }
+            | Self::FolderInTheWay { path }
             | Self::OtherInput { path, .. }
             | Self::Read { path, .. }
             | Self::TooLarge { path, .. }

@@ -35,8 +35,11 @@ pub(crate) struct Failure {
 
 /// Notes why a run stopped.
 pub(crate) fn write(folder: &RunFolder, error: &Error) {
-    // A command that asks for what cannot be says nothing of the results that are there.
-    if !matches!(error.class(), Class::Usage | Class::Locked) {
+    // A command that asks for what cannot be says nothing of the results that are there; where there are none, nor was a
+    // run before, the folder is somebody else's.
+    let is_in_the_way = matches!(error, Error::FileInTheWay { .. } | Error::FolderInTheWay { .. });
+    let is_strange = is_in_the_way && !folder.path().join("provenance").is_dir();
+    if !matches!(error.class(), Class::Usage | Class::Locked) && !is_strange {
         note(folder, error);
     }
 }

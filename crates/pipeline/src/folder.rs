@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use atomic_write_file::AtomicWriteFile;
@@ -23,8 +24,12 @@ pub(crate) struct RunFolder {
     reads: Mutex<BTreeSet<String>>,
     /// The folders that this run made, the innermost first.
     made: Vec<PathBuf>,
+    /// Whether there was no file of a lock before.
+    is_lock_new: bool,
     /// None for a folder that is only read.
-    _lock: Option<Lock>,
+    lock: Option<Lock>,
+    /// Whether results have changed since `SHA256SUMS` was written.
+    is_changing: AtomicBool,
 }
 
 impl RunFolder {
@@ -40,9 +45,9 @@ impl RunFolder {
             .take_while(|folder| !folder.as_os_str().is_empty() && !folder.exists())
             .map(Path::to_owned)
             .collect();
-        let lock = Lock::take(path, patience)?;
-        let digests = read_digests(&path.join(DIGEST_FILE));
-        Ok(Self { path: path.to_owned(), digests, reads: Mutex::default(), made, _lock: Some(lock) })
+        let is_lock_new = !Lock::has_file(path);
+        let lock = Some(Lock::take(path, patience)?);
+        Ok(Self { made, is_lock_new, lock, ..Self::to_read(path) })
     }
 
     /// A folder to read from, without a lock: nothing is written to it.
@@ -52,7 +57,9 @@ impl RunFolder {
             digests: read_digests(&path.join(DIGEST_FILE)),
             reads: Mutex::default(),
             made: Vec::new(),
-            _lock: None,
+            is_lock_new: false,
+            lock: None,
+            is_changing: AtomicBool::new(false),
         }
     }
 
@@ -85,12 +92,34 @@ impl RunFolder {
         self.made.iter().take_while(|folder| fs::remove_dir(folder).is_ok()).for_each(drop);
     }
 
+    /// Takes the file of the lock away again from a folder in which no run has left anything.
+    pub(crate) fn leave_as_found(&self) {
+        if self.is_lock_new && self.digests.is_empty() && !self.path.join("provenance").exists() {
+            Lock::remove_file(&self.path);
+        }
+    }
+
+    /// Whether the last run here was ended while it changed results: nothing vouches yet for some that it has written.
+    pub(crate) fn was_cut_short(&self) -> bool {
+        self.lock.as_ref().is_some_and(|lock| lock.was_cut_short)
+    }
+
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
+    /// Notes that results are about to change.
+    fn begin_change(&self) -> Result<(), Error> {
+        let Some(lock) = &self.lock else { return Ok(()) };
+        if self.is_changing.swap(true, Ordering::Relaxed) {
+            return Ok(());
+        }
+        lock.say_changing(true).map_err(|source| Error::Write { path: self.path.join(".lock"), source })
+    }
+
     /// Writes a result file, whole or not at all.
     pub(crate) fn write(&mut self, relative: &str, bytes: &[u8]) -> Result<(), Error> {
+        self.begin_change()?;
         self.write_aside(relative, bytes)?;
         self.digests.insert(relative.to_owned(), hex_digest(bytes));
         Ok(())
@@ -99,6 +128,11 @@ impl RunFolder {
     /// The digest that the folder has for a file.
     pub(crate) fn digest(&self, relative: &str) -> Option<&String> {
         self.digests.get(relative)
+    }
+
+    /// Whether the folder has a digest for any file below a place, such as `stages/`.
+    pub(crate) fn vouches_below(&self, place: &str) -> bool {
+        self.digests.keys().any(|file| file.starts_with(place))
     }
 
     /// The digest of a file as it lies there now; none if there is none.
@@ -139,10 +173,14 @@ impl RunFolder {
     /// Removes result files that do not follow from the others any more: first from `SHA256SUMS`, so that nothing
     /// vouches for them should this be the moment of a power cut.
     pub(crate) fn discard(&mut self, files: &[String]) -> Result<(), Error> {
+        if files.is_empty() {
+            return Ok(());
+        }
+        self.begin_change()?;
         let n_known = self.digests.len();
         self.digests.retain(|file, _| !files.contains(file));
         if self.digests.len() < n_known {
-            self.seal()?;
+            self.write_digests()?;
         }
         for file in files {
             let path = self.path.join(file);
@@ -227,6 +265,15 @@ impl RunFolder {
 
     /// Writes `SHA256SUMS` (the format of `sha256sum -c`) and gives its own digest.
     pub(crate) fn seal(&self) -> Result<String, Error> {
+        let digest = self.write_digests()?;
+        if let (Some(lock), true) = (&self.lock, self.is_changing.swap(false, Ordering::Relaxed)) {
+            lock.say_changing(false)
+                .map_err(|source| Error::Write { path: self.path.join(".lock"), source })?;
+        }
+        Ok(digest)
+    }
+
+    fn write_digests(&self) -> Result<String, Error> {
         let text: String = self.digests.iter().map(|(file, digest)| format!("{digest}  {file}\n")).collect();
         self.write_aside(DIGEST_FILE, text.as_bytes())?;
         Ok(hex_digest(text.as_bytes()))

@@ -1,10 +1,11 @@
 //! One run at a time in a folder.
 //!
 //! **Guarantees** the system gives the lock back with the file's handle, however the process ends: a dead holder keeps
-//! nothing. Whoever waits for it sees all that the holder has written.
+//! nothing. Whoever waits for it sees all that the holder has written. While results change, the file of the lock says so:
+//! if its holder was killed meanwhile, the next one knows that there may be results which nothing vouches for yet.
 
 use std::fs::{self, File, TryLockError};
-use std::io;
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use crate::error::Error;
@@ -12,6 +13,8 @@ use crate::error::Error;
 const LOCK_FILE: &str = ".lock";
 /// How often a folder may vanish under whoever waits for it: once for each run that fails in it.
 const MOST_TRIES: u32 = 1000;
+/// What the file of the lock says while results change.
+const CHANGING: &[u8] = b"changing\n";
 
 /// What to do where another run holds the folder.
 #[derive(Clone, Copy)]
@@ -23,7 +26,11 @@ pub(crate) enum Patience<'a> {
 }
 
 /// The right to write to a folder; given back when it is dropped.
-pub(crate) struct Lock(#[allow(dead_code, reason = "held, not used")] File);
+pub(crate) struct Lock {
+    file: File,
+    /// Whether its last holder ended while results changed.
+    pub(crate) was_cut_short: bool,
+}
 
 impl Lock {
     /// Takes the lock of a folder, which is made if it is not there.
@@ -32,7 +39,9 @@ impl Lock {
         for tries_left in (0..MOST_TRIES).rev() {
             fs::create_dir_all(folder).map_err(create)?;
             let path = folder.join(LOCK_FILE);
-            let file = match File::create(&path) {
+            // What the last holder has said stays to be read.
+            let mut options = File::options();
+            let mut file = match options.read(true).write(true).create(true).truncate(false).open(&path) {
                 // The holder takes the folder away with it at just this moment.
                 Err(source) if source.kind() == io::ErrorKind::NotFound && tries_left > 0 => continue,
                 created => created.map_err(create)?,
@@ -52,10 +61,30 @@ impl Lock {
             }
             // A run that fails takes the folder that it made away with it; the lock of a file that is gone locks nothing.
             if is_at(&file, &path) {
-                return Ok(Self(file));
+                let mut said = Vec::new();
+                let read = Read::by_ref(&mut file).take(CHANGING.len() as u64).read_to_end(&mut said);
+                let was_cut_short = read.is_ok() && said == CHANGING;
+                return Ok(Self { file, was_cut_short });
             }
         }
         Err(Error::Locked { folder: folder.to_owned() })
+    }
+
+    /// Whether a folder has the file of a lock.
+    pub(crate) fn has_file(folder: &Path) -> bool {
+        folder.join(LOCK_FILE).exists()
+    }
+
+    /// Says in the file whether results are about to change, before they do.
+    pub(crate) fn say_changing(&self, is_changing: bool) -> io::Result<()> {
+        let mut file = &self.file;
+        file.set_len(0)?;
+        if is_changing {
+            file.seek(SeekFrom::Start(0))?;
+            file.write_all(CHANGING)?;
+            file.sync_data()?;
+        }
+        Ok(())
     }
 
     /// Removes the file of the lock from a folder that is about to go; the lock itself is held on.
@@ -96,6 +125,19 @@ mod tests {
         assert!(matches!(second, Err(Error::Locked { .. })));
         drop(first);
         assert!(Lock::take(folder.path(), Patience::None).is_ok());
+    }
+
+    #[test]
+    fn the_next_holder_knows_how_the_last_one_ended() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let was_cut_short = |says: &[bool]| {
+            let lock = Lock::take(folder.path(), Patience::None).expect("a lock");
+            says.iter().for_each(|&is_changing| lock.say_changing(is_changing).expect("said"));
+            lock.was_cut_short
+        };
+        let turns: [&[bool]; 5] = [&[], &[true, false], &[true], &[], &[true, false]];
+        assert_eq!(turns.map(was_cut_short), [false, false, false, true, true]);
+        assert!(!was_cut_short(&[]));
     }
 
     #[test]

@@ -105,6 +105,7 @@ fn run_stages(request: &Request, events: &(dyn Fn(Event) + Sync)) -> Result<Summ
             folder.remove();
         } else {
             failure::write(&folder, error);
+            folder.leave_as_found();
         }
         let kept = run.costs.iter().map(|cost| cost.stage).collect();
         events(Event::Stopped { kept, out: request.out.clone() });
@@ -196,6 +197,7 @@ fn planned(request: &Request) -> Result<Vec<Plan>, Error> {
     let settings = Settings::open(&folder, &request.loaded.config);
     run.refuse_other_settings(&folder, &settings, &stages)?;
     run.take_stock_of_input(&stages)?;
+    run.refuse_to_overwrite(&folder, &stages)?;
     let mut planned: Vec<Plan> = Vec::new();
     for stage in stages {
         let before = planned.iter().rev().find(|plan| plan.reason.is_some() && stage.follows(plan.stage));
@@ -212,7 +214,7 @@ fn planned(request: &Request) -> Result<Vec<Plan>, Error> {
     }
     let is_to_do = |plan: &Plan| plan.reason.is_some() && !plan.is_shared;
     if planned.iter().any(is_to_do) {
-        let costs = costs_of(request, &run.source, &folder, &planned);
+        let costs = costs_of(request, &run.source, &folder, &planned)?;
         for plan in planned.iter_mut().filter(|plan| is_to_do(plan)) {
             plan.cost = costs.iter().find(|(stage, _)| *stage == plan.stage).map(|(_, cost)| *cost);
         }
@@ -221,12 +223,34 @@ fn planned(request: &Request) -> Result<Vec<Plan>, Error> {
 }
 
 /// What the stages of a run would cost, as far as that can be told: by the reports of the stages that are kept, else from its
-/// input. An input that cannot be read is told by the run itself, if it needs it.
-fn costs_of(request: &Request, source: &Source, folder: &RunFolder, planned: &[Plan]) -> Vec<(Stage, Cost)> {
+/// input.
+///
+/// # Errors
+/// Those of the input, if a stage that is to be done reads it: the run would end with them.
+fn costs_of(
+    request: &Request,
+    source: &Source,
+    folder: &RunFolder,
+    planned: &[Plan],
+) -> Result<Vec<(Stage, Cost)>, Error> {
+    let is_to_do = |plan: &&Plan| plan.reason.is_some() && !plan.is_shared;
     let makes_tree = planned.iter().any(|plan| plan.stage <= Stage::Tree && plan.reason.is_some());
-    let of_input = if makes_tree { doctor::sizes_of(request, source).ok().flatten() } else { None };
+    let reads_input = planned.iter().filter(is_to_do).any(|plan| Some(plan.stage) == reader_of(source));
+    let of_input = match makes_tree.then(|| doctor::sizes_of(request, source)) {
+        Some(Err(error)) if reads_input => return Err(error),
+        found => found.and_then(Result::ok).flatten(),
+    };
     let sizes = of_input.or_else(|| Sizes::of_reports(folder));
-    sizes.map(|sizes| doctor::costs(request, &stages_of(source), sizes)).unwrap_or_default()
+    Ok(sizes.map(|sizes| doctor::costs(request, &stages_of(source), sizes)).unwrap_or_default())
+}
+
+/// The stage that reads the user's input.
+fn reader_of(source: &Source) -> Option<Stage> {
+    match source {
+        Source::Volume(_) => Some(Stage::Volume),
+        Source::Tree(_) => Some(Stage::Tree),
+        Source::PhantomScan(_) | Source::PhantomTree(_) => None,
+    }
 }
 
 /// A run under way.
@@ -259,6 +283,7 @@ impl Run<'_> {
         self.refuse_other_settings(folder, &settings, stages)?;
         self.check_hand_over(folder, stages)?;
         self.take_stock_of_input(stages)?;
+        self.refuse_to_overwrite(folder, stages)?;
         self.foreign = self.foreign(&settings);
         (self.events)(Event::Opened {
             out: self.request.out.clone(),
@@ -319,6 +344,33 @@ impl Run<'_> {
                 |name: &str| stages.iter().any(|stage| stage.writes().iter().any(|own| own == name));
             if name.is_some_and(is_written) {
                 return Err(Error::InputInTheWay { path: path.clone() });
+            }
+        }
+        Ok(())
+    }
+
+    /// No result may take the place of a file that no run has made, unless that is asked for; of a folder in no case.
+    fn refuse_to_overwrite(&self, folder: &RunFolder, stages: &[Stage]) -> Result<(), Error> {
+        let beside =
+            provenance::FILES.into_iter().chain(provenance::FILES_ASIDE).chain([failure::FILE, DIGEST_FILE]);
+        let written: Vec<String> =
+            stages.iter().flat_map(|stage| stage.writes()).chain(beside.map(str::to_owned)).collect();
+        let recorded = recorded(folder);
+        // The list of somebody else's files vouches for none of ours.
+        let is_list_ours = !recorded.is_empty()
+            || ["stages/", "provenance/"].iter().any(|place| folder.vouches_below(place))
+            || std::fs::metadata(folder.path().join(DIGEST_FILE)).is_ok_and(|list| list.len() == 0);
+        let may_write = self.request.force || folder.was_cut_short();
+        for file in written {
+            let path = folder.path().join(&file);
+            let Ok(there) = std::fs::symlink_metadata(&path) else { continue };
+            if there.is_dir() {
+                return Err(Error::FolderInTheWay { path });
+            }
+            let is_listed = is_list_ours && (file == DIGEST_FILE || folder.digest(&file).is_some());
+            // In folders of the names that ours have nobody else writes.
+            if !may_write && !file.contains('/') && !is_listed && !recorded.contains(&file) {
+                return Err(Error::FileInTheWay { path });
             }
         }
         Ok(())
@@ -654,6 +706,16 @@ fn outdated(stage: Stage, mut changed: BTreeSet<String>) -> Vec<String> {
 fn undeclared(stage: Stage, reads: BTreeSet<String>) -> Vec<String> {
     let known: Vec<String> = stage.files_read().collect();
     reads.into_iter().filter(|file| !known.contains(file)).collect()
+}
+
+/// The files that the records in a folder name.
+fn recorded(folder: &RunFolder) -> BTreeSet<String> {
+    let record = |stage: Stage| {
+        let bytes = folder.bytes_if_there(&Record::file_of(stage)).ok().flatten()?;
+        Record::parsed(stage, &bytes)
+    };
+    let records = Stage::ALL.into_iter().filter_map(record);
+    records.flat_map(|record| record.files().keys().cloned().collect::<Vec<_>>()).collect()
 }
 
 /// Every file that a run may write, relative to its folder.
