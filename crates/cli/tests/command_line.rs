@@ -518,6 +518,17 @@ fn two_runs_are_compared() {
     for column in table.lines().next().expect("a header").split('\t') {
         assert!(dictionary.contains(&format!("\t{column}\t")), "{column} is not explained");
     }
+    // Runs without a name of their own are called by their folders, runs with titles by these.
+    let has = |file: &str, text: &str| read(file).contains(&format!(">{text}</text>"));
+    assert!(has("both/compare.svg", "a") && has("both/compare.svg", "b"));
+    embedded(folder.path(), "c", &["name=\"patient 5\""]);
+    embedded(folder.path(), "d", &["name=\"patient 5\""]);
+    embedded(folder.path(), "e", &["render.title=\"after\""]);
+    let named = espalier(folder.path(), &["compare", "c", "d", "e", "-o", "named", "-q"]);
+    assert_eq!(named.status.code(), Some(0), "{}", stderr(&named));
+    for title in ["patient 5 (c)", "patient 5 (d)", "after"] {
+        assert!(has("named/compare.svg", title), "{title}");
+    }
     // No result knows a time: the same bytes again, on one thread.
     let again = espalier(folder.path(), &["compare", "a", "b", "-o", "again", "-q", "--threads", "1"]);
     assert_eq!(again.status.code(), Some(0), "{}", stderr(&again));

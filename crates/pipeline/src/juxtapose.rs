@@ -22,7 +22,7 @@ use espalier_render::ChangeOf;
 
 use crate::artifacts::{Artifacts, Lookup, SOURCE_KEY, SOURCE_SCAN, SOURCE_TRACING};
 use crate::cache::Cache;
-use crate::compare::{Files, Place, Subject, figure, names};
+use crate::compare::{Files, Place, Subject, figure, names, titles};
 use crate::config::{Config, Override};
 use crate::error::Error;
 use crate::event::Event;
@@ -175,10 +175,10 @@ fn results(
         .map_err(|error| Error::file(&request.out.join("shared-embedding.json"), error))?;
 
     let mut params = runs[0].config.render.clone();
-    let title = || format!("{} and {}", runs[0].name, runs[1].name);
-    params.title.get_or_insert_with(title);
+    let titles = titles(&runs.map(|run| (&run.config, run.name.as_str())));
+    params.title.get_or_insert_with(|| format!("{} and {}", titles[0], titles[1]));
     params.compass = figure::compass(params.compass, runs[0].is_of_scan);
-    let panels = [format!("baseline: {}", runs[0].name), format!("follow-up: {}", runs[1].name)];
+    let panels = [format!("baseline: {}", titles[0]), format!("follow-up: {}", titles[1])];
     let panels = [panels[0].as_str(), panels[1].as_str()];
     let drawn = espalier_render::juxtaposed((&found, &embedding), request.change, panels, &params)
         .map_err(|error| Error::file(&request.out, error))?;

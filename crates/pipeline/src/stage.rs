@@ -116,8 +116,8 @@ impl Stage {
     pub(crate) fn version(self) -> u32 {
         match self {
             Self::Phantom | Self::Views => 1,
-            Self::Skeleton | Self::Radius | Self::Tree | Self::Render => 2,
-            Self::Volume | Self::Embed | Self::Report => 3,
+            Self::Skeleton | Self::Radius | Self::Tree => 2,
+            Self::Volume | Self::Embed | Self::Render | Self::Report => 3,
         }
     }
 

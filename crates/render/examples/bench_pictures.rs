@@ -1,6 +1,6 @@
 //! Times and peak memory of the pictures of large trees, and of a finished run's.
 //!
-//! `bench_pictures [WIDTH]` draws synthetic trees; `bench_pictures RUN OUT [KEY=VALUE]…` draws a run folder's map into
+//! `bench_pictures [WIDTH]` draws synthetic trees: the map alone, then all that a run makes of it; `bench_pictures RUN OUT [KEY=VALUE]…` draws a run folder's map into
 //! OUT with these settings of `render`.
 #![allow(clippy::print_stdout, clippy::expect_used, clippy::panic, reason = "a program")]
 #![allow(clippy::disallowed_methods, reason = "a program takes the time")]
@@ -13,7 +13,7 @@ use std::time::Instant;
 
 use common::{fern, flat, front};
 use espalier_model::{Embedding, Tree, ViewHierarchy, swc};
-use espalier_render::{Params, Rendered, render};
+use espalier_render::{Params, Rendered, planar_png, planar_svg, render};
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -48,7 +48,7 @@ fn draw(run: &Path, out: &Path, settings: &[String]) {
     }
 }
 
-/// Draws trees of over twenty thousand edges: the map and the global view as PNG, and all files.
+/// Draws trees of over twenty thousand edges: the map alone, with the global view, and all files.
 fn bench(width_px: u32) {
     println!("tree\tedges\tfiles\tpixels\tseconds\tcpu_s\tpeak_mb\tlimit_mb\tpng_mb\texr_mb");
     for (name, scale) in [("stout", 1.0), ("slender", 0.3)] {
@@ -59,13 +59,33 @@ fn bench(width_px: u32) {
             .map(|node| espalier_model::Node { radius_mm: scale * node.radius_mm, ..*node })
             .collect();
         let tree = Tree::new(&nodes).expect("a tree");
+        let print_row = |files: &str| print!("{name}\t{}\t{files}\t", tree.n_nodes() - 1);
+        for has_svg in [false, true] {
+            print_row(if has_svg { "map: PNG, SVG" } else { "map: PNG" });
+            timed_alone(&tree, &flat(&tree), width_px, has_svg);
+        }
         for all in [false, true] {
             let params = Params { width_px, exr: all, pdf: all, ..Params::default() };
-            let files = if all { "all" } else { "2 PNG, SVG" };
-            print!("{name}\t{}\t{files}\t", tree.n_nodes() - 1);
+            print_row(if all { "all" } else { "2 PNG, SVG" });
             timed(&tree, &flat(&tree), &front(&tree), &params);
         }
     }
+}
+
+/// Draws the map alone, and prints pixels, seconds and memory.
+fn timed_alone(tree: &Tree, embedding: &Embedding, width_px: u32, has_svg: bool) {
+    let params = Params { width_px, exr: false, pdf: false, ..Params::default() };
+    let (before, cpu_before) = (Instant::now(), cpu_s());
+    let png = planar_png(tree, embedding, &params).expect("a picture");
+    let svg = has_svg.then(|| planar_svg(tree, embedding, &params).expect("a document"));
+    let (seconds, cpu_s) = (before.elapsed().as_secs_f64(), cpu_s() - cpu_before);
+    std::hint::black_box(svg);
+    // Of a PNG's header.
+    let side = |at: usize| u32::from_be_bytes([png[at], png[at + 1], png[at + 2], png[at + 3]]);
+    let (width, height) = (f64::from(side(16)), f64::from(side(20)));
+    let (limit_mb, png_mb) = (12.0 * width * height / 1e6 + 100.0, png.len() as f64 / 1e6);
+    let peak_mb = peak_mb();
+    println!("{width}×{height}\t{seconds:.2}\t{cpu_s:.2}\t{peak_mb:.0}\t{limit_mb:.0}\t{png_mb:.2}\t0.00");
 }
 
 /// Draws, and prints pixels, seconds and memory.

@@ -1,10 +1,9 @@
-//! Heading, key, root mark and compass.
+//! Heading, key and compass.
 //!
 //! **Input** what to say and the page. **Output** groups of marks.
 //! The key holds the colour bar with its ticks and the scale bar; it is measured before the page is laid out, so
 //! that the tree can leave room.
 
-use espalier_model::Tree;
 use glam::{DVec2, DVec3};
 
 use crate::coloring::{Coloring, Scale, Tick};
@@ -12,7 +11,6 @@ use crate::drawing::{Group, Mark};
 use crate::page::Page;
 use crate::palette::{PageColors, Palette};
 use crate::params::{Compass, Params};
-use crate::scene::Scene;
 use crate::text::{Anchor, Face};
 use crate::unit::{self, LengthUnit};
 
@@ -183,29 +181,6 @@ pub(crate) fn scale_bar(page: &Page, at: DVec2, params: &Params, colors: &PageCo
         },
     ];
     Some(Group { name: "scale-bar", marks })
-}
-
-/// The root mark: a ring around the root, named on the side away from the tree.
-pub(crate) fn root_mark(page: &Page, tree: &Tree, scene: &Scene, colors: &PageColors) -> Group {
-    let unit = page.unit_px;
-    let center = page.px(scene.points_mm[0].truncate());
-    // The ring marks the node; its name stands beside the tube.
-    let ring_px = 0.65 * unit;
-    let radius_px = page.radius_px(scene.radii_mm[0]).max(ring_px);
-    let ring = |width: f64, color| Mark::Ring { center, radius_px: ring_px, width_px: width * unit, color };
-    let away = scene.away_from_branches(tree, 4.0 * unit / page.px_per_mm);
-    let away = DVec2::new(away.x, -away.y);
-    let size_px = BODY * unit;
-    let (anchor, at) = if away.x.abs() > 0.8 {
-        let at = center + DVec2::new(away.x.signum() * (radius_px + 0.5 * unit), 0.35 * size_px);
-        (if away.x > 0.0 { Anchor::Start } else { Anchor::End }, at)
-    } else {
-        let below = if away.y > 0.0 { 0.5 * unit + 0.75 * size_px } else { -0.5 * unit };
-        (Anchor::Middle, center + DVec2::new(away.x * radius_px, away.y.signum() * radius_px + below))
-    };
-    let text = "root".to_owned();
-    let name = Mark::Text { at, size_px, anchor, is_strong: false, color: colors.ink, text };
-    Group { name: "root-mark", marks: vec![ring(0.42, colors.background), ring(0.2, colors.ink), name] }
 }
 
 /// The letters at the edges of the area: which way the picture's right, left, up and down point in the body.

@@ -25,10 +25,12 @@ use crate::paint::Canvas;
 use crate::palette::{PageColors, Palette, Rgb, hex};
 use crate::params::{Params, Style};
 use crate::raster::{self, Drawn, Job, Raster};
+use crate::room::Grid;
 use crate::scene::Scene;
+use crate::sheet::MAX_LAYERS;
 use crate::side_by_side::SideBySide;
 use crate::text::{Anchor, Face};
-use crate::{Error, MAX_LAYERS, heading, svg, unit};
+use crate::{Error, heading, root_mark, svg, unit};
 
 /// In layout units: font sizes of panel names and of the key, space between panels, around a tree, for the key.
 const TITLE: f64 = 1.6;
@@ -296,13 +298,23 @@ impl Artist<'_> {
         groups.extend(furniture::key(&key_page, &self.coloring.key, self.params, &self.colors));
         let (swatches, bottom) = self.swatches(swatches_at, unit);
         groups.push(swatches);
-        for panel in &panels {
-            groups.push(self.panel_marks(panel, names[panel.tree], unit));
-        }
         let lowest = panels[1].page.area[1].y.max(bottom);
         let (width, height) = (self.params.width_px, (lowest + margin) as u32);
         if u64::from(width) * u64::from(height) > MAX_PIXELS {
             return Err(Error::TooLarge { width, height, limit: MAX_PIXELS });
+        }
+        let names = [0, 1].map(|tree: usize| self.name_of(&panels[tree], names[tree], unit));
+        let mut room = Grid::new([width, height], unit);
+        room.take_marks(&groups, &self.face);
+        room.take_marks(&names, &self.face);
+        for panel in &panels {
+            room.take_branches(&panel.page, &self.found.shared, &self.scene);
+        }
+        for (panel, mut group) in panels.iter().zip(names) {
+            let subject = (&self.found.shared, &self.scene);
+            let root = root_mark::root_mark((&panel.page, &mut room), subject, (&self.face, &self.colors));
+            group.marks.extend(root.marks);
+            groups.push(group);
         }
         let style = self.style(&panels);
         Ok(Sheet { panels, groups, height, style })
@@ -318,13 +330,11 @@ impl Artist<'_> {
         if panels.iter().any(is_thick) { Style::Line } else { self.params.style }
     }
 
-    /// Name and root of a panel.
-    fn panel_marks(&self, panel: &Panel, name: &str, unit: f64) -> Group {
+    /// The name of a panel.
+    fn name_of(&self, panel: &Panel, name: &str, unit: f64) -> Group {
         let low = panel.page.area[0];
-        let root = furniture::root_mark(&panel.page, &self.found.shared, &self.scene, &self.colors);
         let at = DVec2::new(low.x, low.y - 0.4 * TITLE * unit);
-        let mut marks = vec![self.text(at, TITLE * unit, true, name)];
-        marks.extend(root.marks);
+        let marks = vec![self.text(at, TITLE * unit, true, name)];
         Group { name: if panel.tree == 0 { "baseline" } else { "follow-up" }, marks }
     }
 

@@ -4,7 +4,7 @@
 //! mark.
 //! **Steps** 1. Long branches whose chord in space leaves the direction that the map gives it by [`OFF_DEG`] or more, the
 //! longest first. 2. Each takes the first free place beside its middle, its quarters, its end; without one it goes
-//! unnamed. What is taken stands in a grid of cells.
+//! unnamed.
 //! **Guarantees** at most [`MOST`] texts; the same for the same page.
 //! **Source** ours: a map keeps no directions, so one compass cannot speak for all branches.
 //! **Cost** O(nodes + branches · log branches).
@@ -18,6 +18,7 @@ use crate::furniture::direction_letters;
 use crate::page::Page;
 use crate::palette::PageColors;
 use crate::params::Compass;
+use crate::room::Grid;
 use crate::scene::Scene;
 use crate::text::{Anchor, Face};
 
@@ -45,19 +46,14 @@ pub(crate) struct Map<'a> {
     pub axes: [DVec3; 2],
 }
 
-/// The letters at branches; `taken` are boxes (low, high) of other marks.
+/// The letters at branches, which take their places.
 pub(crate) fn at_branches(
     map: &Map<'_>,
+    room: &mut Grid,
     (face, colors): (&Face, &PageColors),
     kind: Compass,
-    taken: &[[DVec2; 2]],
 ) -> Group {
     let unit = map.page.unit_px;
-    let mut grid = Grid::new(map.page);
-    for &[low, high] in taken {
-        grid.take(low, high);
-    }
-    map.take_branches(&mut grid);
     let mut marks = Vec::new();
     for (branch, direction) in map.strays() {
         if marks.len() == MOST {
@@ -65,10 +61,10 @@ pub(crate) fn at_branches(
         }
         let Some(text) = direction_letters(direction, kind).filter(|text| !text.is_empty()) else { continue };
         let size = DVec2::new(f64::from(face.width(&text, (SIZE * unit) as f32)), 0.75 * SIZE * unit);
-        let Some(center) = map.places(branch, size).into_iter().find(|&at| grid.is_free(at, size)) else {
+        let Some(center) = map.places(branch, size).into_iter().find(|&at| room.is_free(at, size)) else {
             continue;
         };
-        grid.take(center - 0.5 * size, center + 0.5 * size);
+        room.take(center - 0.5 * size, center + 0.5 * size);
         let at = center + DVec2::new(0.0, 0.5 * size.y);
         let (size_px, color) = (SIZE * unit, colors.ink);
         marks.push(Mark::Text { at, size_px, anchor: Anchor::Middle, is_strong: true, color, text });
@@ -119,55 +115,5 @@ impl Map<'_> {
             }
         }
         places
-    }
-
-    /// Takes the cells under the branches.
-    pub(crate) fn take_branches(&self, grid: &mut Grid) {
-        for (node, parent) in self.tree.edges() {
-            let [a, b] = [parent, node].map(|n| self.page.px(self.scene.points_mm[n].truncate()));
-            let radius_px = self.page.radius_px(self.scene.radii_mm[node].max(self.scene.radii_mm[parent]));
-            let n_steps = (a.distance(b) / grid.cell_px).min(1e5) as usize + 1;
-            for i in 0..=n_steps {
-                let at = a.lerp(b, i as f64 / n_steps as f64);
-                grid.take(at - radius_px, at + radius_px);
-            }
-        }
-    }
-}
-
-/// Which cells of a page are taken.
-pub(crate) struct Grid {
-    cell_px: f64,
-    size: [usize; 2],
-    is_taken: Vec<bool>,
-}
-
-impl Grid {
-    pub(crate) fn new(page: &Page) -> Self {
-        let cell_px = 0.35 * page.unit_px;
-        let size = [page.width, page.height].map(|pixels| (f64::from(pixels) / cell_px) as usize + 1);
-        Self { cell_px, size, is_taken: vec![false; size[0] * size[1]] }
-    }
-
-    /// The cells from a point to another, inside of the page.
-    fn cells(&self, low: DVec2, high: DVec2) -> impl Iterator<Item = usize> + use<> {
-        let cell = |at: f64, n: usize| ((at / self.cell_px).max(0.0) as usize).min(n);
-        let [n_x, n_y] = self.size;
-        let columns = cell(low.x, n_x)..cell(high.x + self.cell_px, n_x);
-        let rows = cell(low.y, n_y)..cell(high.y + self.cell_px, n_y);
-        rows.flat_map(move |row| columns.clone().map(move |column| row * n_x + column))
-    }
-
-    pub(crate) fn take(&mut self, low: DVec2, high: DVec2) {
-        for cell in self.cells(low, high) {
-            self.is_taken[cell] = true;
-        }
-    }
-
-    pub(crate) fn is_free(&self, center: DVec2, size: DVec2) -> bool {
-        let (low, high) = (center - 0.5 * size, center + 0.5 * size);
-        let page = DVec2::new(self.size[0] as f64, self.size[1] as f64) * self.cell_px;
-        let is_inside = low.cmpge(DVec2::ZERO).all() && high.cmplt(page).all();
-        is_inside && !self.cells(low, high).any(|cell| self.is_taken[cell])
     }
 }

@@ -28,9 +28,10 @@ use crate::palette::PageColors;
 use crate::params::{Compass, Params, Style};
 use crate::raster::{self, Drawn, Job, Raster};
 use crate::scene::Scene;
+use crate::sheet::MAX_LAYERS;
 use crate::text::{Anchor, Face};
 use crate::tiling::{Room, Tiling};
-use crate::{Error, MAX_LAYERS, parts, sketch};
+use crate::{Error, parts, sketch};
 
 /// Sizes in layout units: font sizes of panel titles and notes, the least panel, the space between panels.
 const TITLE: f64 = 1.5;

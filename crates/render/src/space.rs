@@ -32,9 +32,10 @@ use crate::palette::{PageColors, Palette, Rgb};
 use crate::params::{ColorBy, Compass, Params, SpaceView, Style};
 use crate::raster::{self, Drawn, Job, Pixel, Raster};
 use crate::scene::Scene;
+use crate::sheet::MAX_LAYERS;
 use crate::side_by_side::SideBySide;
 use crate::text::{Anchor, Face};
-use crate::{Error, MAX_LAYERS, heading, sketch};
+use crate::{Error, heading, root_mark, sketch};
 
 /// Wider figures show no more of a mask of a thousand voxels.
 const MOST_WIDTH: u32 = 4096;
@@ -315,9 +316,7 @@ impl<'a> Artist<'a> {
     fn marks(&self, frame: &Frame) -> Group {
         let unit = frame.page.unit_px;
         let [low, _] = frame.page.area;
-        let root = furniture::root_mark(&frame.page, self.subject.tree, &frame.scene, &self.colors);
-        let mut marks: Vec<Mark> =
-            root.marks.into_iter().filter(|mark| matches!(mark, Mark::Ring { .. })).collect();
+        let mut marks = Vec::from(root_mark::ring(&frame.page, &frame.scene, &self.colors));
         if frame.kind != Kind::Map {
             let axes = [self.view.right(), self.view.up];
             let compass = furniture::compass(&frame.page, axes, self.params.compass, &self.colors);

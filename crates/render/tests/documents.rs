@@ -6,7 +6,9 @@ mod common;
 use common::{fern, flat, front, node, tube};
 use espalier_model::diagnose::{Class, Diagnose};
 use espalier_model::{Embedding, Tree};
-use espalier_render::{ColorBy, Compass, Error, Fit, Params, Rendered, Style, Theme, Unit, render};
+use espalier_render::{
+    ColorBy, Compass, Error, Fit, Params, Rendered, Style, Theme, Unit, planar_png, planar_svg, render,
+};
 use glam::DVec2;
 
 fn draw(tree: &Tree, params: &Params) -> Rendered {
@@ -91,6 +93,56 @@ fn the_key_says_round_numbers_in_a_readable_unit() {
     assert_eq!(legend(1.0, &Params { unit: Unit::Um, ..quick() }).1, ["10000 µm"]);
     let (steps, ..) = legend(1.0, &Params { color_by: ColorBy::Generation, ..quick() });
     assert_eq!(steps, ["generation", "0"]);
+}
+
+#[test]
+fn the_name_of_the_root_lies_over_no_branch_and_is_led_to_if_it_is_apart() {
+    let arm = |i: u32, n: u32| {
+        let (sin, cos) = espalier_geom::math::sin_cos(f64::from(i) * std::f64::consts::TAU / f64::from(n));
+        node(30.0 * cos, 0.0, 30.0 * sin, 2.0, Some(0))
+    };
+    for n_arms in [1, 2, 5, 11] {
+        let root = std::iter::once(node(0.0, 0.0, 0.0, 2.0, None));
+        let tree = Tree::new(&root.chain((0..n_arms).map(|i| arm(i, n_arms))).collect::<Vec<_>>());
+        let tree = tree.expect("a tree");
+        let svg = draw(&tree, &quick()).svg;
+        let document = roxmltree::Document::parse(&svg).expect("well-formed XML");
+        let group = document.descendants().find(|n| n.attribute("id") == Some("root-mark")).expect("a mark");
+        let of = |node: roxmltree::Node<'_, '_>, name: &str| -> f64 {
+            node.attribute(name).and_then(|text| text.parse().ok()).expect("a number")
+        };
+        let find = |tag: &str| group.descendants().find(|n| n.has_tag_name(tag));
+        let (ring, name) = (find("circle").expect("a ring"), find("text").expect("a name"));
+        let at = |x: f64, y: f64| DVec2::new(x, y);
+        let center = at(of(ring, "cx"), of(ring, "cy"));
+        let mm_per_px = of(document.root_element(), "data-mm-per-px");
+        // The name is four letters wide, and stands on its middle.
+        let size = of(name, "font-size");
+        let corners = [-1.0, 0.0, 1.0].map(|side: f64| {
+            [0.0, 0.7].map(|up: f64| at(of(name, "x") + side * size, of(name, "y") - up * size))
+        });
+        for corner in corners.as_flattened() {
+            for i in 0..n_arms {
+                let end = center + at(1.0, -1.0) * flat(&tree).positions_mm[i as usize + 1] / mm_per_px;
+                let share =
+                    ((*corner - center).dot(end - center) / (end - center).length_squared()).clamp(0.0, 1.0);
+                let outside_px = corner.distance(center.lerp(end, share)) - 2.0 / mm_per_px;
+                assert!(outside_px > 0.0, "{n_arms} arms: {outside_px} px off");
+            }
+        }
+        if [1, 11].contains(&n_arms) {
+            assert_eq!(find("line").is_some(), n_arms == 11, "{n_arms} arms");
+        }
+    }
+}
+
+#[test]
+fn the_map_alone_is_that_of_all_files() {
+    let tree = fern(5, 3, 1.0);
+    let all = draw(&tree, &quick());
+    assert_eq!(planar_png(&tree, &flat(&tree), &quick()).expect("a picture"), all.png);
+    assert_eq!(planar_svg(&tree, &flat(&tree), &quick()).expect("a document"), all.svg);
+    assert!(planar_png(&tree, &flat(&tree), &Params { width_px: 1, ..quick() }).is_err());
 }
 
 #[test]

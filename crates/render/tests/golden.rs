@@ -105,6 +105,23 @@ fn many_short_cones_are_one_tube() {
 }
 
 #[test]
+fn bends_are_round_inside() {
+    // Turns of 20°, 50°, 90° and back, with a short edge in one of them, and a step in width.
+    let bends = [
+        node(0.0, 0.0, 0.0, 4.0, None),
+        node(14.0, 0.0, 0.0, 4.0, Some(0)),
+        node(27.0, 0.0, 5.0, 4.0, Some(1)),
+        node(31.0, 0.0, 16.0, 4.0, Some(2)),
+        node(30.0, 0.0, 18.0, 4.0, Some(3)),
+        node(16.0, 0.0, 22.0, 3.0, Some(4)),
+        node(13.0, 0.0, 22.0, 1.5, Some(5)),
+        node(4.0, 0.0, 22.0, 1.5, Some(6)),
+        node(4.0, 0.0, 9.0, 1.5, Some(7)),
+    ];
+    check_map("bends", &tree(&bends), &tiny());
+}
+
+#[test]
 fn a_thin_end_does_not_vanish() {
     check_map("thin-end", &tube(60.0, [3.0, 0.0]), &tiny());
 }
@@ -232,6 +249,17 @@ fn a_branch_in_front_leaves_a_gap_and_letters_tell_the_sides() {
 #[test]
 fn the_legend_has_room() {
     check_map("legend", &tube(60.0, [1.5, 0.7]), &Params { width_px: 480, ..tiny() });
+}
+
+#[test]
+fn the_name_of_a_crowded_root_stands_where_there_is_room() {
+    let arm = |i: u32| {
+        let (sin, cos) = espalier_geom::math::sin_cos(f64::from(i) * std::f64::consts::TAU / 9.0);
+        node(20.0 * cos, 0.0, 20.0 * sin, 1.6, Some(0))
+    };
+    let star: Vec<Node> = std::iter::once(node(0.0, 0.0, 0.0, 1.6, None)).chain((0..9).map(arm)).collect();
+    let params = Params { width_px: 480, style: Style::Line, aspect: Some(0.6), ..tiny() };
+    check_map("crowded-root", &tree(&star), &Params { min_width_px: 16.0, ..params });
 }
 
 #[test]

@@ -129,6 +129,148 @@ fn a_taper_moves_the_radius_and_the_thickest_wins_the_height() {
     }
 }
 
+/// Two arms of 30 mm and radius 4 mm that meet at the origin, the second turned by so much to the left.
+fn bend(turn_deg: f64) -> Tree {
+    let (sin, cos) = espalier_geom::math::sin_cos(turn_deg.to_radians());
+    let nodes = [
+        node(-30.0, 0.0, 0.0, 4.0, None),
+        node(0.0, 0.0, 0.0, 4.0, Some(0)),
+        node(30.0 * cos, 0.0, 30.0 * sin, 4.0, Some(1)),
+    ];
+    Tree::new(&nodes).expect("a tree")
+}
+
+/// Two tubes of radius 4 joined in a bend, by how far their axes lie from a point: as `samples` have it.
+fn joined(asides: [DVec2; 2]) -> f64 {
+    let levels = asides.map(|aside| 16.0 - aside.length_squared());
+    let [first, second] = levels;
+    let facing = |i: usize| {
+        let soft = 0.5 * (levels[i] + levels[i].hypot(1.6));
+        asides[i].extend(soft.sqrt()).normalize()
+    };
+    let cosine = facing(0).dot(facing(1));
+    // Fillets fade over half a radius beyond the outlines.
+    let say = asides.map(|aside| (1.0 - (aside.length() - 4.0).max(0.0) / 2.0).clamp(0.0, 1.0));
+    let [sin, cos] = [1.0 - cosine, 1.0 + cosine].map(|twice: f64| (0.5 * twice.max(0.0)).sqrt());
+    let k = 16.0 * (8.0 * (1.0 - cos)).min(1.4 * sin) * say[0] * say[1];
+    let apart = (first - second).abs();
+    first.max(second) + if apart < k { (k - apart) * (k - apart) / (4.0 * k) } else { 0.0 }
+}
+
+#[test]
+fn a_bend_has_its_closed_form_inside_and_is_a_ball_outside() {
+    for turn_deg in [10.0_f64, 20.0, 38.0, 60.0, 90.0] {
+        let tree = bend(turn_deg);
+        let layers = Layers::of(&tree, &flat(&tree), &Params { width_px: 900, ..Params::default() });
+        let (sin, cos) = espalier_geom::math::sin_cos(turn_deg.to_radians());
+        let (first, second) = (DVec2::X, DVec2::new(cos, sin));
+        let mm_per_px = (layers.plane(1, 0) - layers.plane(0, 0)).x;
+        let mut n_joined = 0;
+        for (x, y) in layers.pixels() {
+            let point = layers.plane(x, y);
+            let (height, covered) = (layers.at("height.mm", x, y), layers.at("A", x, y));
+            let along = [-point.dot(first), point.dot(second)];
+            // Beside both arms both count, beyond both only the ball at the joint.
+            let level = if along[0] > 0.0 && along[1] > 0.0 && along[0].max(along[1]) < 28.0 {
+                let asides = [first, second].map(|axis| point - point.dot(axis) * axis);
+                let bare = asides.map(|aside| 16.0 - aside.length_squared());
+                let level = joined(asides);
+                n_joined += usize::from(level > bare[0].max(bare[1]) + 0.01);
+                level
+            } else if along[0] < 0.0 && along[1] < 0.0 {
+                16.0 - point.length_squared()
+            } else {
+                continue;
+            };
+            let outside = (16.0 - level).sqrt() - 4.0;
+            if level > 1.0 {
+                assert!(
+                    (height * height - level).abs() < 0.02,
+                    "{turn_deg} {point}: {height} {}",
+                    level.sqrt()
+                );
+            }
+            assert!(
+                (covered - (0.5 - outside / mm_per_px).clamp(0.0, 1.0)).abs() < 0.06,
+                "{turn_deg} {point}: {covered} {outside}"
+            );
+        }
+        assert!(n_joined > 60, "{turn_deg} {n_joined}");
+    }
+}
+
+#[test]
+fn nodes_of_a_straight_tube_do_not_show() {
+    // Steps of all lengths, from far less than the radius to far more.
+    let mut stream = espalier_geom::random::Stream::new(3, espalier_geom::random::Purpose::Test, 0, 0);
+    let mut nodes = vec![node(0.0, 0.0, 0.0, 3.0, None)];
+    while nodes[nodes.len() - 1].position_mm.x < 40.0 {
+        let x = nodes[nodes.len() - 1].position_mm.x + stream.uniform(0.02, 1.0).powi(3) * 12.0;
+        nodes.push(node(x, 0.0, 0.0, 3.0, Some(nodes.len() - 1)));
+    }
+    let tree = Tree::new(&nodes).expect("a tree");
+    let layers = Layers::of(&tree, &flat(&tree), &Params { width_px: 900, ..Params::default() });
+    for (x, y) in layers.pixels() {
+        let point = layers.plane(x, y);
+        if (0.0..40.0).contains(&point.x) && point.y.abs() < 2.9 {
+            let height = (9.0 - point.y * point.y).sqrt();
+            assert!((layers.at("height.mm", x, y) - height).abs() < 0.01, "{point}");
+            assert_eq!(layers.at("A", x, y), 1.0);
+        }
+    }
+}
+
+#[test]
+fn a_smooth_curve_keeps_its_width_and_nothing_jumps() {
+    // Half a circle of radius 9 in steps of 3 to 12 degrees, a tube of radius 3.
+    for step_deg in [3.0_f64, 6.0, 12.0] {
+        let n_steps = (180.0 / step_deg) as usize;
+        let at = |i: usize| {
+            let (sin, cos) = espalier_geom::math::sin_cos((step_deg * i as f64).to_radians());
+            node(9.0 * cos, 0.0, 9.0 * sin, 3.0, i.checked_sub(1))
+        };
+        let tree = Tree::new(&(0..=n_steps).map(at).collect::<Vec<_>>()).expect("a tree");
+        let layers = Layers::of(&tree, &flat(&tree), &Params { width_px: 700, ..Params::default() });
+        let mm_per_px = (layers.plane(1, 0) - layers.plane(0, 0)).x;
+        // A polygon stands inside of its circle by this much.
+        let flat_mm = 9.0 * (1.0 - espalier_geom::math::cos(0.5 * step_deg.to_radians()));
+        for (x, y) in layers.pixels() {
+            let point = layers.plane(x, y);
+            let aside = point.length() - 9.0;
+            if point.y > 0.5 && aside.abs() < 2.6 {
+                let off = 2.0 * (flat_mm + mm_per_px) * 2.6 / (9.0_f64 - 2.6 * 2.6).sqrt();
+                let height = (9.0 - aside * aside).sqrt();
+                let seen = layers.at("height.mm", x, y);
+                assert!((seen - height).abs() < off, "{step_deg} {point}: {seen} {height}");
+            }
+        }
+    }
+    // Two turns with a short edge between them: where either is the highest, the surface goes on without a step.
+    let tree = Tree::new(&[
+        node(-20.0, 0.0, 0.0, 4.0, None),
+        node(0.0, 0.0, 0.0, 4.0, Some(0)),
+        node(1.2, 0.0, 0.4, 4.0, Some(1)),
+        node(14.0, 0.0, 12.0, 4.0, Some(2)),
+    ])
+    .expect("a tree");
+    let layers = Layers::of(&tree, &flat(&tree), &Params { width_px: 1200, ..Params::default() });
+    let mut most: f64 = 0.0;
+    for (x, y) in layers.pixels() {
+        let point = layers.plane(x, y);
+        if point.length() > 6.0 {
+            continue;
+        }
+        let at = |x: usize, y: usize| layers.at("height.mm", x, y);
+        let least = [at(x - 1, y), at(x, y), at(x + 1, y), at(x, y - 1), at(x, y + 1)];
+        if least.into_iter().all(|height| height > 2.2) {
+            let bent = (at(x - 1, y) - 2.0 * at(x, y) + at(x + 1, y)).abs();
+            let bent = bent.max((at(x, y - 1) - 2.0 * at(x, y) + at(x, y + 1)).abs());
+            most = most.max(bent);
+        }
+    }
+    assert!(most < 0.012, "{most}");
+}
+
 #[test]
 fn the_surface_has_no_gap_anywhere_along_the_tree() {
     let tree = fern(11, 4, 1.0);

@@ -164,6 +164,21 @@ pub(crate) fn names(subjects: &[Subject]) -> Vec<String> {
     names
 }
 
+/// What pictures call each run, by its config and its name in the table: its title, or the name that its config gives it,
+/// with the table's name behind it where another is called the same; else the table's name.
+pub(crate) fn titles(runs: &[(&Config, &str)]) -> Vec<String> {
+    let title = |config: &Config| config.render.title.clone().or(config.own_name().map(str::to_owned));
+    let own: Vec<Option<String>> = runs.iter().map(|(config, _)| title(config)).collect();
+    let called = |(own_title, (_, name)): (&Option<String>, &(&Config, &str))| match own_title {
+        None => (*name).to_owned(),
+        Some(title) if title == name || own.iter().filter(|other| *other == own_title).count() == 1 => {
+            title.clone()
+        }
+        Some(title) => format!("{title} ({name})"),
+    };
+    own.iter().zip(runs).map(called).collect()
+}
+
 /// Reads a run folder, every file checked against the folder's digests.
 fn read_run(request: &CompareRequest, path: &Path, name: String) -> Result<Found, Error> {
     for missing in
@@ -222,11 +237,14 @@ fn results(request: &CompareRequest, runs: &[Found]) -> Result<(ComparedRuns, Fi
     let rows = ComparedRuns { runs: runs.iter().map(rows_of).collect() };
     let mut params = runs.first().map(|run| run.config.render.clone()).unwrap_or_default();
     params.title.get_or_insert_with(|| match runs {
-        [only] => only.name.clone(),
+        [only] => only.config.own_name().unwrap_or(&only.name).to_owned(),
         several => format!("{} runs", several.len()),
     });
-    let subject = |run| figure_subject(run, runs.len() > 1, params.compass);
-    let subjects: Vec<figure::Subject<'_>> = runs.iter().map(subject).collect();
+    let called: Vec<(&Config, &str)> = runs.iter().map(|run| (&run.config, run.name.as_str())).collect();
+    let titles = titles(&called);
+    let title = |idx: usize| (runs.len() > 1).then_some(titles[idx].as_str());
+    let subject = |(idx, run)| figure_subject(run, title(idx), params.compass);
+    let subjects: Vec<figure::Subject<'_>> = runs.iter().enumerate().map(subject).collect();
     let drawn = figure::draw(&subjects, &params).map_err(|error| Error::file(&request.out, error))?;
     let mut files = vec![
         ("compare.tsv".to_owned(), rows.to_tsv().into_bytes()),
@@ -237,9 +255,13 @@ fn results(request: &CompareRequest, runs: &[Found]) -> Result<(ComparedRuns, Fi
     Ok((rows, files))
 }
 
-fn figure_subject(run: &Found, is_named: bool, compass: espalier_render::Compass) -> figure::Subject<'_> {
+fn figure_subject<'a>(
+    run: &'a Found,
+    name: Option<&'a str>,
+    compass: espalier_render::Compass,
+) -> figure::Subject<'a> {
     figure::Subject {
-        name: is_named.then_some(run.name.as_str()),
+        name,
         tree: &run.tree,
         views: &run.views,
         comparison: &run.comparison,

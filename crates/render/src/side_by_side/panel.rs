@@ -13,7 +13,7 @@ use glam::DVec2;
 use super::{Artist, Frame, LEADING, N_NOTES, NOTE, RIM, Section, TITLE, strong};
 use crate::drawing::{Group, Mark};
 use crate::page::Page;
-use crate::{furniture, heading};
+use crate::{furniture, heading, root_mark};
 
 /// The letters to the left and right of a tree need this much beside its rim, in layout units.
 pub(super) const SIDE: f64 = 3.3;
@@ -25,9 +25,7 @@ impl Artist<'_> {
     pub(super) fn panel_marks(&self, section: &Section<'_>, frame: &Frame<'_>, panel_idx: usize) -> Group {
         let unit = self.unit_px();
         let [low, high] = frame.page.area;
-        let root = furniture::root_mark(&frame.page, frame.tree, &frame.scene, &self.colors);
-        let mut marks: Vec<Mark> =
-            root.marks.into_iter().filter(|mark| matches!(mark, Mark::Ring { .. })).collect();
+        let mut marks = Vec::from(root_mark::ring(&frame.page, &frame.scene, &self.colors));
         let panel = panel_idx.checked_sub(1).map(|idx| &section.panels[idx]);
         if let Some(panel) = panel {
             let (radius, width) =

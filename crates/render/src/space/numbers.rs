@@ -9,7 +9,8 @@ use glam::DVec2;
 
 use super::{Artist, Frame, Kind, Sheet};
 use crate::drawing::{Group, Mark};
-use crate::letters::{Grid, Map};
+use crate::letters::Map;
+use crate::room::Grid;
 use crate::text::Anchor;
 
 /// More numbers than this nobody reads.
@@ -24,11 +25,8 @@ pub(super) fn at_branches(artist: &Artist<'_>, sheet: &Sheet<'_>) -> Option<Grou
     let of_kind = |kind: Kind| sheet.frames.iter().find(|frame| frame.kind == kind);
     let mut sides = [Side::new(artist, of_kind(Kind::Line)?), Side::new(artist, of_kind(Kind::Map)?)];
     for side in &mut sides {
-        for mark in sheet.groups.iter().flat_map(|group| &group.marks) {
-            let [low, high] = mark.bounds(&artist.face);
-            side.grid.take(low, high);
-        }
-        side.map.take_branches(&mut side.grid);
+        side.grid.take_marks(&sheet.groups, &artist.face);
+        side.grid.take_branches(side.map.page, side.map.tree, side.map.scene);
     }
     let mut marks = Vec::new();
     for branch in longest(artist) {
@@ -76,7 +74,11 @@ impl<'a> Side<'a> {
             page: &frame.page,
             axes,
         };
-        Self { map, grid: Grid::new(&frame.page), area: frame.page.area }
+        Self {
+            map,
+            grid: Grid::new([frame.page.width, frame.page.height], frame.page.unit_px),
+            area: frame.page.area,
+        }
     }
 
     /// A free place beside a branch.
