@@ -86,7 +86,7 @@ pub(crate) fn root_mark(
 fn places(first_rad: f64) -> impl Iterator<Item = (f64, DVec2)> {
     let turn = std::f64::consts::PI / N_ASIDE as f64;
     let aside = move |i: usize| {
-        let sign = if i % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = if i.is_multiple_of(2) { 1.0 } else { -1.0 };
         math::unit_vector(first_rad + sign * turn * i.div_ceil(2) as f64)
     };
     (0..=N_STEPS).flat_map(move |step| (0..2 * N_ASIDE).map(move |i| (STEP * step as f64, aside(i))))

@@ -1,7 +1,7 @@
 //! The layouts of several methods beside the tree in space, in one figure.
 //!
 //! **Input** for each tree its global view and the layouts of its methods. **Output** PNG and SVG.
-//! **Files** `panel`: what stands around each tree; `document`: the SVG.
+//! **Files** `panel`: what stands around each tree.
 //! **Steps** 1. Each tree is a section: its view in space, then its layouts, tiled in rows at one scale. 2. Main
 //! subtrees have the same colours in every panel. 3. Crossings get rings; of a cluster, as many as do not hide it.
 //! 4. Below each panel its row of the table in short; what is best among the section's layouts without crossings is
@@ -10,7 +10,6 @@
 //! section shows lines.
 //! **Source** figures of section 5 of [Hu2022]. **Cost** that of as many small pictures.
 
-mod document;
 mod panel;
 
 use espalier_model::{Branches, MethodRow, Tree, View};
@@ -31,7 +30,7 @@ use crate::scene::Scene;
 use crate::sheet::MAX_LAYERS;
 use crate::text::{Anchor, Face};
 use crate::tiling::{Room, Tiling};
-use crate::{Error, parts, sketch};
+use crate::{Error, parts, sketch, svg};
 
 /// Sizes in layout units: font sizes of panel titles and notes, the least panel, the space between panels.
 const TITLE: f64 = 1.5;
@@ -109,7 +108,26 @@ pub fn side_by_side(sections: &[Section<'_>], params: &Params) -> Result<SideByS
         artist.draw(frame, &mut canvas);
     }
     canvas.mark(&sheet.groups, &artist.face);
-    Ok(SideBySide { png: canvas.png(), svg: artist.svg(&sheet, height) })
+    let prefixes: Vec<String> =
+        (0..sheet.frames.len()).map(|panel_idx| format!("panel-{panel_idx}-")).collect();
+    let title = params.title.as_deref().unwrap_or("methods side by side");
+    let trees = sheet.frames.iter().zip(&prefixes);
+    let items: Vec<svg::Item<'_>> = trees.map(|(frame, prefix)| frame_item(frame, prefix, title)).collect();
+    let svg = svg::figure(("compare", title), (&items, &sheet.groups), ([width, height], &artist.colors));
+    Ok(SideBySide { png: canvas.png(), svg })
+}
+
+/// The tree of a panel.
+fn frame_item<'a>(frame: &'a Frame<'_>, prefix: &'a str, title: &'a str) -> svg::Item<'a> {
+    let content = svg::Content {
+        tree: frame.tree,
+        branches: &frame.branches,
+        scene: &frame.scene,
+        coloring: &frame.coloring,
+        title,
+        prefix,
+    };
+    svg::Item::Tree(content, &frame.page)
 }
 
 /// A panel in its place.

@@ -14,7 +14,14 @@
 //! **Guarantees** only basic arithmetic and square roots: the same bits on every machine.
 //! **Cost** O(1) for a pixel.
 
+mod joint;
+mod outline;
+
 use glam::{DVec3, Vec2, Vec3};
+
+pub(crate) use joint::Joint;
+use joint::{Bend, LitEnd, axis};
+use outline::Outline;
 
 /// Below this tilt a cone counts as flat.
 const FLAT: f32 = 1e-6;
@@ -51,42 +58,6 @@ pub(crate) struct Cone {
     /// The box that holds the cone: low and high corner.
     bounds: (Vec2, Vec2),
     outline: Outline,
-}
-
-/// The hull of two discs.
-#[derive(Clone, Copy, Debug)]
-struct Outline {
-    /// How long the axis is seen.
-    seen: f32,
-    /// Sine and cosine of the angle between the outline's straight sides and the axis; `None` where one disc holds the
-    /// other.
-    side: Option<[f32; 2]>,
-}
-
-impl Outline {
-    fn new(seen: f32, radii: [f32; 2]) -> Self {
-        let taper = radii[1] - radii[0];
-        let sin = taper / seen;
-        Self { seen, side: (taper.abs() < seen).then(|| [sin, (1.0 - sin * sin).sqrt()]) }
-    }
-}
-
-/// The direction of the surface at an end of a cone, as light sees it.
-#[derive(Clone, Copy, Debug)]
-struct LitEnd {
-    axis: Vec3,
-    taper: f32,
-    /// Whether the end is a whole ball, round to the last.
-    is_end: bool,
-}
-
-/// How a chain goes on beyond an end of a cone.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Joint {
-    /// A tip, a fork or the root: the end is a whole ball.
-    End,
-    /// One more edge follows, to or from the ball given.
-    Chain(Ball),
 }
 
 /// A place on a cone.
@@ -127,12 +98,7 @@ impl Cone {
         let (unit, length, k) = axis(start, end);
         let seen = unit.truncate().length();
         let along = if seen > 1e-9 { unit.truncate() / seen } else { glam::DVec2::X };
-        let bend = |joint: Joint, chain: &dyn Fn(Ball) -> [Ball; 3]| match joint {
-            Joint::Chain(ball) => Bend::new(chain(ball)),
-            Joint::End => Bend { reach: 1.0, axis: unit, taper: k, is_end: true },
-        };
-        let before = bend(joints[0], &|ball| [ball, start, end]);
-        let after = bend(joints[1], &|ball| [start, end, ball]);
+        let [before, after] = Bend::of([start, end], joints);
         // The surface at axis place s lies at x = s m − k r, shifted by up to |u_z| r where the axis is tilted:
         // this much on either side of an end even where the chain goes straight on.
         let lean = |radius: f64| (k.abs() + unit.z.abs()).min(1.0) * radius + 1.0;
@@ -156,11 +122,7 @@ impl Cone {
             length: length as f32,
             k: k as f32,
             range: range.map(|bound| bound as f32),
-            lit: [before, after].map(|bend| LitEnd {
-                axis: bend.axis.as_vec3(),
-                taper: bend.taper as f32,
-                is_end: bend.is_end,
-            }),
+            lit: [before.lit(), after.lit()],
             bounds: ((a - radii[0]).min(b - radii[1]), (a + radii[0]).max(b + radii[1])),
             outline: Outline::new(length as f32 * seen as f32, radii),
         }
@@ -266,7 +228,8 @@ impl Cone {
         if x < self.range[0] || x > self.range[1] {
             return None;
         }
-        let outside = self.outside(pixel, w, x);
+        let from_end = pixel - self.end.truncate();
+        let outside = self.outline.outside([w, from_end], [x, w.perp_dot(self.along).abs()]);
         if outside > margin {
             return None;
         }
@@ -278,23 +241,6 @@ impl Cone {
         let height = level.max(0.0).sqrt();
         let share = if self.length > 0.0 { s / self.length } else { 0.0 };
         Some(Hit { z: self.start.z + s * self.uz + height, height, level, offset, radius, share, outside })
-    }
-
-    /// The signed distance to the outline: of the hull of two discs, or of the larger if it holds the other.
-    fn outside(&self, pixel: Vec2, w: Vec2, x: f32) -> f32 {
-        let from_start = || w.length() - self.radii[0];
-        let from_end = || (pixel - self.end.truncate()).length() - self.radii[1];
-        let Outline { seen, side } = self.outline;
-        let Some([sin, cos]) = side else { return from_start().min(from_end()) };
-        let y = w.perp_dot(self.along).abs();
-        let tangent = x * cos + y * sin;
-        if tangent < 0.0 {
-            from_start()
-        } else if tangent > seen * cos {
-            from_end()
-        } else {
-            y * cos - x * sin - self.radii[0]
-        }
     }
 
     /// s*: the place along the axis whose sphere is highest above the pixel.
@@ -339,110 +285,5 @@ impl Cone {
     }
 }
 
-/// Unit axis, length and taper from one ball to the next.
-fn axis(start: Ball, end: Ball) -> (DVec3, f64, f64) {
-    let axis = end.center - start.center;
-    let length = axis.length();
-    if length > 0.0 {
-        (axis / length, length, (end.radius - start.radius) / length)
-    } else {
-        (DVec3::Z, 0.0, 0.0)
-    }
-}
-
-/// An end of a cone.
-struct Bend {
-    /// How far, in radii, the cones must reach beyond it: tan(turn/2) fills the wedge on the outer side, and the
-    /// change of taper moves the borders of their surfaces.
-    reach: f64,
-    /// The axis and the taper half way between the two cones.
-    axis: DVec3,
-    taper: f64,
-    /// Whether nothing follows.
-    is_end: bool,
-}
-
-impl Bend {
-    fn new([before, joint, after]: [Ball; 3]) -> Self {
-        let (p, p_length, p_taper) = axis(before, joint);
-        let (q, q_length, q_taper) = axis(joint, after);
-        let cos = if p_length > 0.0 && q_length > 0.0 { p.dot(q) } else { -1.0 };
-        // tan(turn/2) = √((1 − cos)/(1 + cos)); a sharp turn takes the whole ball.
-        let tan_half = if cos > 0.0 { ((1.0 - cos).max(0.0) / (1.0 + cos)).sqrt() } else { 1.0 };
-        Self {
-            reach: (tan_half + (q_taper - p_taper).abs()).min(1.0),
-            axis: (p + q).normalize_or(q),
-            taper: 0.5 * (p_taper + q_taper),
-            is_end: false,
-        }
-    }
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn ball(x: f64, y: f64, z: f64, radius: f64) -> Ball {
-        Ball { center: DVec3::new(x, y, z), radius }
-    }
-
-    /// The slow form: the highest of many spheres along the axis.
-    fn highest_sphere(start: Ball, end: Ball, pixel: Vec2) -> Option<f64> {
-        let n = 20_000;
-        (0..=n)
-            .filter_map(|i| {
-                let s = f64::from(i) / f64::from(n);
-                let center = start.center.lerp(end.center, s);
-                let radius = start.radius + s * (end.radius - start.radius);
-                let g = radius * radius - (pixel.as_dvec2() - center.truncate()).length_squared();
-                (g >= 0.0).then(|| center.z + g.sqrt())
-            })
-            .max_by(f64::total_cmp)
-    }
-
-    #[test]
-    fn height_is_the_highest_sphere() {
-        let cases = [
-            (ball(10.0, 10.0, 0.0, 4.0), ball(30.0, 18.0, 0.0, 4.0)),
-            (ball(10.0, 10.0, 0.0, 6.0), ball(30.0, 18.0, 0.0, 2.0)),
-            (ball(10.0, 10.0, -3.0, 3.0), ball(26.0, 20.0, 9.0, 5.0)),
-            (ball(20.0, 15.0, -9.0, 6.0), ball(20.5, 15.2, 9.0, 3.0)),
-            (ball(20.0, 15.0, 0.0, 2.0), ball(21.0, 15.0, 0.0, 7.0)),
-            (ball(20.0, 15.0, 4.0, 5.0), ball(20.0, 15.0, -8.0, 5.0)),
-        ];
-        for (start, end) in cases {
-            let cone = Cone::new(start, end, [Joint::End; 2]);
-            let mut n_inside = 0;
-            for y in 0..30 {
-                for x in 0..45 {
-                    let pixel = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-                    let hit = cone.at(pixel, 0.0);
-                    let Some(expected) = highest_sphere(start, end, pixel) else {
-                        assert!(hit.is_none_or(|hit| hit.outside > -0.01), "{start:?} {end:?} {pixel}");
-                        continue;
-                    };
-                    n_inside += 1;
-                    if let Some(hit) = hit {
-                        let rim = hit.outside > -0.05;
-                        assert!(
-                            rim || (f64::from(hit.z) - expected).abs() < 2e-2,
-                            "{pixel} {hit:?} {expected}"
-                        );
-                    }
-                    let (from, to) = cone.span(pixel.y, 0.0).expect("a row inside");
-                    assert!(from <= pixel.x && pixel.x <= to, "{pixel} outside {from}..{to}");
-                }
-            }
-            assert!(n_inside > 20);
-        }
-    }
-
-    #[test]
-    fn outline_distance_is_right() {
-        let cone = Cone::new(ball(10.0, 10.0, 0.0, 4.0), ball(30.0, 10.0, 0.0, 4.0), [Joint::End; 2]);
-        let outside = |x: f32, y: f32| cone.at(Vec2::new(x, y), 5.0).expect("near").outside;
-        assert!((outside(20.0, 10.0) + 4.0).abs() < 1e-5);
-        assert!((outside(20.0, 15.0) - 1.0).abs() < 1e-5);
-        assert!((outside(34.5, 10.0) - 0.5).abs() < 1e-5);
-    }
-}
+mod tests;

@@ -9,7 +9,9 @@
 //! **Guarantees** work is counted, not timed, so that the figure is the same on every machine.
 //! **Cost** O(points).
 
-use espalier_geom::math;
+mod axes;
+
+use axes::Axes;
 use espalier_model::{MethodRow, TracePoint};
 use glam::DVec2;
 
@@ -32,8 +34,6 @@ const RIGHT: f64 = 24.0;
 const BELOW: f64 = 5.0;
 /// Line height over font size.
 const LEADING: f64 = 1.45;
-/// The most decades of energy that are shown: nobody needs to tell 1e-9 of the start from 0.
-const MOST_DECADES: f64 = 8.0;
 /// Curves with more points have neither dots nor words.
 const MOST_DOTS: usize = 40;
 
@@ -91,63 +91,6 @@ fn heading(params: &Params, methods: &[Searched<'_>]) -> Heading {
         "ring = the layout has crossings".to_owned(),
     ];
     Heading { title, verdict, facts }
-}
-
-/// Two logarithmic axes in pixels.
-struct Axes {
-    corners: [DVec2; 2],
-    /// Decades of work and of energy at the ends of the axes.
-    work: [f64; 2],
-    energy: [f64; 2],
-}
-
-impl Axes {
-    fn of(methods: &[Searched<'_>], corners: [DVec2; 2]) -> Self {
-        let decade = |value: f64| math::log10(value);
-        let work = methods.iter().flat_map(|method| method.trace).map(|point| point.evaluations as f64);
-        let (least_work, most_work) = work
-            .filter(|&work| work > 1.0)
-            .fold((f64::INFINITY, 10.0), |(least, most), work| (f64::min(least, work), f64::max(most, work)));
-        let energies = methods.iter().flat_map(|method| {
-            let row = std::iter::once(method.row.energy.total());
-            row.chain(method.trace.iter().map(|point| point.energy))
-        });
-        let shown: Vec<f64> = energies.filter(|energy| *energy > 0.0 && energy.is_finite()).collect();
-        let top = shown.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let bottom = shown.iter().copied().fold(f64::INFINITY, f64::min);
-        let energy = if shown.is_empty() {
-            [-1.0, 0.0]
-        } else {
-            let high = decade(top) + 0.15;
-            [(decade(bottom) - 0.15).max(high - MOST_DECADES), high]
-        };
-        let first = if least_work.is_finite() { (decade(least_work) - 0.3).max(0.0) } else { 0.0 };
-        Self { corners, work: [first, decade(most_work) + 0.05], energy }
-    }
-
-    fn x(&self, work: f64) -> f64 {
-        let [from, to] = self.work;
-        let share = (math::log10(work.max(1.0)) - from) / (to - from);
-        self.corners[0].x + share.clamp(0.0, 1.0) * (self.corners[1].x - self.corners[0].x)
-    }
-
-    fn y(&self, energy: f64) -> f64 {
-        let [from, to] = self.energy;
-        // Nothing, or a number that is none, stands at the bottom.
-        let share = if energy > 0.0 { (math::log10(energy) - from) / (to - from) } else { 0.0 };
-        self.corners[1].y - share.clamp(0.0, 1.0) * (self.corners[1].y - self.corners[0].y)
-    }
-
-    fn at(&self, point: &TracePoint) -> DVec2 {
-        DVec2::new(self.x(point.evaluations as f64), self.y(point.energy))
-    }
-
-    /// Round values inside an axis: powers of ten, with 2 and 5 where there are few decades.
-    fn ticks([from, to]: [f64; 2]) -> Vec<f64> {
-        let all = unit::ladder(math::pow(10.0, from), math::pow(10.0, to));
-        let is_power = |value: &f64| (math::log10(*value) - math::log10(*value).round()).abs() < 1e-9;
-        if to - from < 2.5 { all } else { all.into_iter().filter(is_power).collect() }
-    }
 }
 
 struct Chart {
@@ -343,68 +286,4 @@ fn counted(value: f64) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use espalier_model::{Energy, Losses, Phase, TargetKind};
-
-    use super::*;
-
-    fn row(method: &str, energy: f64, crossings: usize) -> MethodRow {
-        MethodRow {
-            method: method.to_owned(),
-            crossings,
-            overlaps: 0,
-            energy: Energy { length: energy, ..Energy::default() },
-            losses: Losses::default(),
-            evaluations: 9,
-            targets: TargetKind::Intrinsic,
-        }
-    }
-
-    fn point(phase: Phase, evaluations: u64, energy: f64) -> TracePoint {
-        TracePoint { phase, iteration: 0, evaluations, energy, crossings: 0 }
-    }
-
-    fn svg_of(methods: &[(MethodRow, Vec<TracePoint>)]) -> String {
-        let searched: Vec<Searched<'_>> =
-            methods.iter().map(|(row, trace)| Searched { row, trace, is_chosen: false }).collect();
-        convergence(&searched, &Params { width_px: 600, ..Params::default() }).expect("a figure").svg
-    }
-
-    #[test]
-    fn a_search_has_dots_and_words_and_a_construction_a_broken_line() {
-        let trace = vec![
-            point(Phase::Start, 0, 10.0),
-            point(Phase::Descent, 1000, 1.0),
-            point(Phase::Barrier, 1001, 0.99),
-        ];
-        let svg = svg_of(&[(row("solver", 0.99, 0), trace), (row("radial", 5.0, 3), Vec::new())]);
-        assert!(svg.contains(">start<") && svg.contains(">descent<"), "{svg}");
-        assert!(!svg.contains(">barrier<"), "it would stand on the word beside it");
-        assert!(svg.contains(">radial 5, 3 crossings<") && svg.contains(">solver 0.99<"), "{svg}");
-        assert!(svg.matches("<line").count() > 20, "dashes");
-    }
-
-    #[test]
-    fn nothing_odd_leaves_the_chart() {
-        let odd = vec![
-            point(Phase::Start, 0, f64::INFINITY),
-            point(Phase::Swarm, u64::MAX, f64::NAN),
-            point(Phase::Swarm, u64::MAX, 0.0),
-        ];
-        for methods in [
-            vec![],
-            vec![(row("solver", 0.0, 0), odd.clone())],
-            vec![(row("solver", 1e300, 0), odd), (row("radial", 1e-300, 0), Vec::new())],
-        ] {
-            let svg = svg_of(&methods);
-            assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
-        }
-    }
-
-    #[test]
-    fn numbers_that_can_be_read() {
-        for (value, expected) in [(1.0, "1"), (200.0, "200"), (1e3, "1 k"), (5e6, "5 M"), (1e10, "10 G")] {
-            assert_eq!(counted(value), expected);
-        }
-    }
-}
+mod tests;

@@ -7,6 +7,8 @@
 //! the PNG but for the light. A scan on the map is an image, and the branches over it have no colour.
 //! **Cost** O(nodes).
 
+mod marks;
+
 use std::fmt::Write as _;
 
 use base64::Engine as _;
@@ -14,20 +16,15 @@ use base64::prelude::BASE64_STANDARD;
 use espalier_model::xml::escape;
 use espalier_model::{Branch, Branches, Tree};
 use glam::DVec2;
+pub(crate) use marks::write_groups;
 
 use crate::coloring::{Coloring, mean_radius_mm};
-use crate::drawing::{Group, Mark};
+use crate::drawing::Group;
 use crate::outline::{outline, polyline, svg_data};
 use crate::page::Page;
-use crate::palette::{PageColors, Palette, Rgb, hex};
+use crate::palette::{PageColors, Rgb, hex};
 use crate::params::Style;
 use crate::scene::Scene;
-use crate::text::Anchor;
-
-/// Stops of a gradient in a colour bar.
-const N_STOPS: usize = 17;
-/// Generic fonts near the one of the PNG.
-const FONTS: &str = "Ubuntu, 'Segoe UI', 'Helvetica Neue', Arial, sans-serif";
 
 /// What the SVG shows.
 #[derive(Clone, Copy, Debug)]
@@ -87,38 +84,62 @@ pub(crate) fn svg(
     out
 }
 
-/// A plot as a document of its own, `espalier-KIND-svg`.
-pub(crate) fn plot(
-    kind: &str,
-    title: &str,
-    groups: &[Group],
-    ([width, height], colors): ([u32; 2], &PageColors),
+/// What a figure of several panels shows in one of them.
+pub(crate) enum Item<'a> {
+    /// A tree, as paths.
+    Tree(Content<'a>, &'a Page),
+    /// A picture that fills the panel's area, as PNG, under a name.
+    Picture(&'static str, &'a [u8], &'a Page),
+}
+
+/// A figure of several panels as a document of its own, `espalier-KIND-svg`. Ids of branches begin with the panel's prefix.
+pub(crate) fn figure(
+    (kind, title): (&str, &str),
+    (items, groups): (&[Item<'_>], &[Group]),
+    (size, colors): ([u32; 2], &PageColors),
 ) -> String {
-    let mut out = String::new();
-    // Writing to a String cannot fail.
-    let _ = writeln!(
-        out,
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" version=\"1.1\" \
-         width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
-         data-format=\"espalier-{kind}-svg\" data-version=\"1\">\n<title>{}</title>\n\
-         <rect id=\"background\" width=\"{width}\" height=\"{height}\" fill=\"{}\"/>",
-        escape(title),
-        hex(colors.background)
-    );
+    let mut out = begun((kind, title), size, colors);
+    for item in items {
+        match item {
+            Item::Tree(content, page) => tree(&mut out, content, page, colors),
+            Item::Picture(id, png, page) => {
+                let (low, [width, height]) = (page.area[0], page.panel().size());
+                let _ = writeln!(
+                    out,
+                    "<image id=\"{id}\" x=\"{}\" y=\"{}\" width=\"{width}\" height=\"{height}\" \
+                     xlink:href=\"data:image/png;base64,{}\"/>",
+                    low.x,
+                    low.y,
+                    BASE64_STANDARD.encode(png)
+                );
+            }
+        }
+    }
     write_groups(&mut out, groups);
     out.push_str("</svg>\n");
     out
 }
 
-/// Marks in named groups.
-pub(crate) fn write_groups(out: &mut String, groups: &[Group]) {
-    for group in groups {
-        let _ = writeln!(out, "<g id=\"{}\" font-family=\"{FONTS}\">", group.name);
-        for mark in &group.marks {
-            write_mark(out, mark);
-        }
-        out.push_str("</g>\n");
-    }
+/// A plot as a document of its own, `espalier-KIND-svg`.
+pub(crate) fn plot(
+    kind: &str,
+    title: &str,
+    groups: &[Group],
+    (size, colors): ([u32; 2], &PageColors),
+) -> String {
+    figure((kind, title), (&[], groups), (size, colors))
+}
+
+/// The first lines of a document `espalier-KIND-svg`: its size, title and paper.
+pub(crate) fn begun((kind, title): (&str, &str), [width, height]: [u32; 2], colors: &PageColors) -> String {
+    format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" \
+         xmlns:xlink=\"http://www.w3.org/1999/xlink\" version=\"1.1\" width=\"{width}\" height=\"{height}\" \
+         viewBox=\"0 0 {width} {height}\" data-format=\"espalier-{kind}-svg\" data-version=\"1\">\n\
+         <title>{}</title>\n<rect id=\"background\" width=\"{width}\" height=\"{height}\" fill=\"{}\"/>\n",
+        escape(title),
+        hex(colors.background)
+    )
 }
 
 /// The branches, each a path, over their dark edges.
@@ -226,82 +247,4 @@ fn write_branch(
         content.branches.length_mm(tree, branch_idx),
         mean_radius_mm(tree, branch),
     );
-}
-
-fn write_mark(out: &mut String, mark: &Mark) {
-    let _ = match mark {
-        Mark::Text { at, size_px, anchor, is_strong, color, text } => {
-            let anchor = match anchor {
-                Anchor::Start => "start",
-                Anchor::Middle => "middle",
-                Anchor::End => "end",
-            };
-            let weight = if *is_strong { " font-weight=\"bold\"" } else { "" };
-            writeln!(
-                out,
-                "<text x=\"{:.2}\" y=\"{:.2}\" font-size=\"{size_px:.2}\" text-anchor=\"{anchor}\"{weight} \
-                 fill=\"{}\">{}</text>",
-                at.x,
-                at.y,
-                hex(*color),
-                escape(text)
-            )
-        }
-        Mark::Line { from, to, width_px, color } => writeln!(
-            out,
-            "<line x1=\"{:.2}\" y1=\"{:.2}\" x2=\"{:.2}\" y2=\"{:.2}\" stroke=\"{}\" stroke-width=\"{width_px:.2}\"/>",
-            from.x,
-            from.y,
-            to.x,
-            to.y,
-            hex(*color)
-        ),
-        Mark::Bent { points, width_px, color } => {
-            let places: Vec<String> = points.iter().map(|at| format!("{:.2},{:.2}", at.x, at.y)).collect();
-            writeln!(
-                out,
-                "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{width_px:.2}\" \
-                 stroke-linejoin=\"round\"/>",
-                places.join(" "),
-                hex(*color)
-            )
-        }
-        Mark::Bar { corner, size, palette } => {
-            write_bar(out, [*corner, *size], palette);
-            Ok(())
-        }
-        Mark::Ring { center, radius_px, width_px, color } => writeln!(
-            out,
-            "<circle cx=\"{:.2}\" cy=\"{:.2}\" r=\"{radius_px:.2}\" fill=\"none\" stroke=\"{}\" \
-             stroke-width=\"{width_px:.2}\"/>",
-            center.x,
-            center.y,
-            hex(*color)
-        ),
-    };
-}
-
-/// A continuous bar is a rectangle with a gradient, one in steps a rectangle for each.
-fn write_bar(out: &mut String, [corner, size]: [DVec2; 2], palette: &Palette) {
-    if palette.is_continuous {
-        out.push_str("<linearGradient id=\"bar\" x1=\"0\" y1=\"1\" x2=\"0\" y2=\"0\">\n");
-        for i in 0..N_STOPS {
-            let share = i as f32 / (N_STOPS - 1) as f32;
-            let _ = writeln!(out, "<stop offset=\"{share:.4}\" stop-color=\"{}\"/>", hex(palette.at(share)));
-        }
-        out.push_str("</linearGradient>\n");
-    }
-    let n_boxes = if palette.is_continuous { 1 } else { palette.len() };
-    let step = size.y / n_boxes as f64;
-    for i in 0..n_boxes {
-        let fill =
-            if palette.is_continuous { "url(#bar)".to_owned() } else { hex(palette.at(palette.value_of(i))) };
-        let _ = writeln!(
-            out,
-            "<rect x=\"{:.2}\" y=\"{:.2}\" width=\"{:.2}\" height=\"{step:.2}\" fill=\"{fill}\"/>",
-            corner.x,
-            corner.y + size.y - (i + 1) as f64 * step,
-            size.x
-        );
-    }
 }

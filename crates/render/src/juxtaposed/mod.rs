@@ -1,6 +1,7 @@
 //! Two trees on one shared map, side by side at one scale and pose, differences coloured.
 //!
 //! **Input** the shared tree with what is known of its nodes, its places in the plane. **Output** PNG and SVG.
+//! **Files** `colors`: what has which colour; `document`: the SVG.
 //! **Steps** 1. The map is drawn twice, beside itself or below, whichever is larger: once with the radii of the baseline,
 //! once with those of the follow-up. 2. The baseline is grey; what it has alone has the colour of loss. In the follow-up
 //! what both have is coloured by its change, on a diverging scale whose middle is no change; what is new has a colour of
@@ -9,20 +10,20 @@
 //! **Source** section 4.1 and figure 8 of [Hu2022]; the colours are ours.
 //! **Cost** that of two small pictures.
 
-use std::fmt::Write as _;
+mod colors;
+mod document;
 
-use espalier_model::{Embedding, Fate, Juxtaposition, SharedNode, change_percent};
+use colors::Colors;
+use espalier_model::{Embedding, Fate, Juxtaposition, SharedNode};
 use glam::DVec2;
 
-use crate::coloring::{Coloring, Scale, Tick, value_at_share};
 use crate::cone::{Ball, Cone, Joint};
 use crate::drawing::{Group, Mark};
 use crate::furniture::{self, Heading};
 use crate::kinship::Kinship;
-use crate::outline::{outline, svg_data};
 use crate::page::{MAX_PIXELS, Page, Pen};
 use crate::paint::Canvas;
-use crate::palette::{PageColors, Palette, Rgb, hex};
+use crate::palette::PageColors;
 use crate::params::{Params, Style};
 use crate::raster::{self, Drawn, Job, Raster};
 use crate::room::Grid;
@@ -30,7 +31,7 @@ use crate::scene::Scene;
 use crate::sheet::MAX_LAYERS;
 use crate::side_by_side::SideBySide;
 use crate::text::{Anchor, Face};
-use crate::{Error, heading, root_mark, svg, unit};
+use crate::{Error, heading, root_mark, unit};
 
 /// In layout units: font sizes of panel names and of the key, space between panels, around a tree, for the key.
 const TITLE: f64 = 1.6;
@@ -46,9 +47,6 @@ const MOST_HEIGHT: f64 = 0.85;
 const LEAST_GAIN_BELOW: f64 = 1.5;
 /// Width of what a tree has not, as a share of the least width of a branch.
 const GHOST: f64 = 0.75;
-/// Ends of the scale, in percent; the first that holds what is to be seen.
-const ENDS_PERCENT: [f64; 5] = [10.0, 20.0, 30.0, 40.0, 60.0];
-
 /// What the colours of the follow-up mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ChangeOf {
@@ -120,112 +118,6 @@ fn heading_of(found: &Juxtaposition, embedding: &Embedding, params: &Params) -> 
     facts.push("what both have is drawn at the baseline's lengths and bends".to_owned());
     facts.push("thin lines: what the other one has".to_owned());
     Heading { title: params.title.clone(), verdict, facts }
-}
-
-/// Colours by node: a palette value at both ends of its edge, for either panel.
-struct Colors {
-    /// The diverging scale alone, with its ticks, for the key.
-    key: Coloring,
-    /// The scale and the colours of loss, gain and neither.
-    palette: Palette,
-    ends: [Vec<[f32; 2]>; 2],
-    lost: Rgb,
-    new: Rgb,
-    neither: Rgb,
-}
-
-impl Colors {
-    fn new(found: &Juxtaposition, change: ChangeOf) -> Self {
-        let scale = Palette::changes();
-        let [lost, new, neither] = Palette::fates();
-        let (palette, factor, [of_lost, of_new, of_neither]) = scale.with([lost, new, neither]);
-        let changes: Vec<[f64; 2]> =
-            (0..found.nodes.len()).map(|node| changes_at(found, change, node)).collect();
-        let end = end_percent(found, change, &changes);
-        let value = |percent: f64| {
-            let share = (0.5 + 0.5 * percent / end).clamp(0.0, 1.0) as f32;
-            if percent.is_finite() { share * factor } else { of_neither }
-        };
-        let baseline = |node: &SharedNode| match node.fate {
-            Fate::Matched => [of_neither; 2],
-            Fate::Lost => [of_lost; 2],
-            Fate::New => [of_new; 2],
-        };
-        let followup = |(node, changes): (&SharedNode, &[f64; 2])| match node.fate {
-            Fate::Matched => changes.map(value),
-            _ => baseline(node),
-        };
-        let ends = [
-            found.nodes.iter().map(baseline).collect(),
-            found.nodes.iter().zip(&changes).map(followup).collect(),
-        ];
-        let caption = match change {
-            ChangeOf::Radius => "radius change (%)",
-            ChangeOf::Length => "length change (%)",
-        };
-        let most = changes.iter().flatten().copied().filter(|change| change.is_finite());
-        let (least, most) = most.fold((0.0, 0.0), |(low, high): (f64, f64), c| (low.min(c), high.max(c)));
-        let ticks = ticks(end, [least < -1.001 * end, most > 1.001 * end]);
-        let scale_of = Scale { caption: caption.to_owned(), ticks };
-        let key = Coloring { palette: scale, ends: Vec::new(), scale: Some(scale_of) };
-        Self { key, palette, ends, lost, new, neither }
-    }
-}
-
-/// The change at the upper and at the lower end of a node's edge, in percent; `NaN` where it is not known.
-fn changes_at(found: &Juxtaposition, change: ChangeOf, node: usize) -> [f64; 2] {
-    let Some(row) = found.nodes[node].row else { return [f64::NAN; 2] };
-    if change == ChangeOf::Length {
-        return [found.rows[row].length_change_percent(); 2];
-    }
-    let at = |node: usize| {
-        let SharedNode { baseline_radius_mm, followup_radius_mm, .. } = found.nodes[node];
-        change_percent([baseline_radius_mm.unwrap_or(f64::NAN), followup_radius_mm.unwrap_or(f64::NAN)])
-    };
-    // At a fork the incoming tube is drawn, so its change is shown there.
-    let above = found.shared.parent(node).map(at).filter(|change| change.is_finite());
-    [above.unwrap_or(at(node)), at(node)]
-}
-
-/// The end of a scale that tells nearly all changes apart, and the narrowest place of each branch.
-fn end_percent(found: &Juxtaposition, change: ChangeOf, changes: &[[f64; 2]]) -> f64 {
-    let known = |node: &usize| found.nodes[*node].fate == Fate::Matched && changes[*node][1].is_finite();
-    let spread = (1..found.nodes.len())
-        .filter(known)
-        .map(|node| (changes[node][1].abs(), found.shared.edge_length_mm(node)));
-    let at_share = value_at_share(spread.collect());
-    let narrowest = found.of_fate(Fate::Matched).map(|row| row.narrowest_percent.abs());
-    let narrowest = narrowest.filter(|percent| percent.is_finite() && change == ChangeOf::Radius);
-    let wanted = narrowest.fold(at_share.unwrap_or(0.0), f64::max);
-    let [.., last] = ENDS_PERCENT;
-    ENDS_PERCENT.into_iter().find(|&end| end >= wanted).unwrap_or(last)
-}
-
-/// Five ticks: no change in the middle, signs on the others; `is_clipped` at either end.
-fn ticks(end: f64, is_clipped: [bool; 2]) -> Vec<Tick> {
-    [-1.0, -0.5, 0.0, 0.5, 1.0]
-        .into_iter()
-        .map(|share: f64| {
-            let number = unit::text((share * end).abs(), 3);
-            let beyond = match share {
-                -1.0 if is_clipped[0] => "≤ ",
-                1.0 if is_clipped[1] => "≥ ",
-                _ => "",
-            };
-            let sign = if share < 0.0 {
-                "−"
-            } else if share > 0.0 {
-                "+"
-            } else {
-                ""
-            };
-            Tick {
-                position: 0.5 + 0.5 * share,
-                text: format!("{beyond}{sign}{number}"),
-                is_mean: share == 0.0,
-            }
-        })
-        .collect()
 }
 
 /// One of the two trees in its place.
@@ -440,116 +332,4 @@ impl Artist<'_> {
         });
         canvas.surface(&raster, [panel.page.area[0].x as usize, panel.page.area[0].y as usize], |_, _| ());
     }
-
-    fn svg(&self, sheet: &Sheet, title: &str) -> String {
-        let (width, height) = (self.params.width_px, sheet.height);
-        let mut out = String::new();
-        // Writing to a String cannot fail.
-        let _ = writeln!(
-            out,
-            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" \
-             xmlns:xlink=\"http://www.w3.org/1999/xlink\" version=\"1.1\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
-             data-format=\"espalier-juxtaposition-svg\" data-version=\"1\">\n<title>{}</title>\n\
-             <rect id=\"background\" width=\"{width}\" height=\"{height}\" fill=\"{}\"/>",
-            espalier_model::xml::escape(title),
-            hex(self.colors.background)
-        );
-        for panel in &sheet.panels {
-            let page = Page { pen: Pen { style: sheet.style, ..panel.page.pen }, ..panel.page };
-            self.write_tree(&mut out, panel.tree, &page);
-        }
-        svg::write_groups(&mut out, &sheet.groups);
-        out.push_str("</svg>\n");
-        out
-    }
-
-    /// A tree as one path for each run of edges of one row and one fate.
-    fn write_tree(&self, out: &mut String, tree: usize, page: &Page) {
-        let name = ["baseline", "follow-up"][tree];
-        let _ =
-            writeln!(out, "<g id=\"{name}-branches\" stroke-linecap=\"round\" stroke-linejoin=\"round\">");
-        let mut runs = self.runs(tree);
-        // Threads at the bottom, then thick over thin as in the raster.
-        let width_mm = |run: &Run| {
-            run.nodes[1..].iter().filter_map(|&node| self.radius_mm(tree, node)).fold(0.0, f64::max)
-        };
-        runs.sort_by(|a, b| a.is_there.cmp(&b.is_there).then(width_mm(a).total_cmp(&width_mm(b))));
-        if page.pen.style != Style::Line {
-            let rim = hex(self.colors.rim);
-            let _ = writeln!(out, "<g stroke=\"{rim}\" stroke-opacity=\"0.75\" stroke-width=\"1.3\">");
-            for (run_idx, _) in runs.iter().enumerate().filter(|(_, run)| run.is_there) {
-                let _ = writeln!(out, "<use xlink:href=\"#{name}-{run_idx}\"/>");
-            }
-            out.push_str("</g>\n");
-        }
-        for (run_idx, run) in runs.iter().enumerate() {
-            self.write_run(out, (tree, name, run_idx), run, page);
-        }
-        out.push_str("</g>\n");
-    }
-
-    fn runs(&self, tree: usize) -> Vec<Run> {
-        let mut runs: Vec<Run> = Vec::new();
-        for (node, parent) in self.found.shared.edges() {
-            let is_there = self.has(tree, node, parent);
-            let key = (self.found.nodes[node].row, self.found.nodes[node].fate, is_there);
-            match runs.last_mut() {
-                Some(run) if run.nodes.last() == Some(&parent) && run.key == key => run.nodes.push(node),
-                _ => runs.push(Run { key, is_there, nodes: vec![parent, node] }),
-            }
-        }
-        runs
-    }
-
-    fn write_run(
-        &self,
-        out: &mut String,
-        (tree, name, run_idx): (usize, &str, usize),
-        run: &Run,
-        page: &Page,
-    ) {
-        let own = &run.nodes[1..];
-        let mean = own.iter().map(|&node| self.coloring.ends[tree][node][1]).sum::<f32>() / own.len() as f32;
-        let fill = hex(self.coloring.palette.at(mean));
-        let center = |node: usize| page.px(self.scene.points_mm[node].truncate());
-        let row = run.key.0.unwrap_or(0);
-        let ids = format!(
-            "id=\"{name}-{run_idx}\" data-row=\"{row}\" data-fate=\"{}\" data-present=\"{}\"",
-            run.key.1.name(),
-            run.is_there
-        );
-        if run.is_there && page.pen.style != Style::Line {
-            let radius = |place: usize| {
-                // At a fork the run begins with its own tube.
-                let node = if place == 0 && self.found.nodes[run.nodes[0]].row != run.key.0 {
-                    own[0]
-                } else {
-                    run.nodes[place]
-                };
-                page.radius_px(self.radius_mm(tree, node).unwrap_or(0.0))
-            };
-            let points: Vec<(DVec2, f64)> =
-                run.nodes.iter().enumerate().map(|(place, &node)| (center(node), radius(place))).collect();
-            let _ = writeln!(out, "<path {ids} d=\"{}Z\" fill=\"{fill}\"/>", svg_data(&outline(&points)));
-            return;
-        }
-        let mut path = String::new();
-        for (place, &node) in run.nodes.iter().enumerate() {
-            let at = center(node);
-            let _ = write!(path, "{}{:.2} {:.2}", if place == 0 { "M" } else { "L" }, at.x, at.y);
-        }
-        let width = page.pen.min_width_px * if run.is_there { 1.0 } else { GHOST };
-        let _ = writeln!(
-            out,
-            "<path {ids} d=\"{path}\" fill=\"none\" stroke=\"{fill}\" stroke-width=\"{width:.2}\"/>"
-        );
-    }
-}
-
-/// Edges that follow on one another, of one row and fate, which a tree has or has not.
-struct Run {
-    key: (Option<usize>, Fate, bool),
-    is_there: bool,
-    /// From the node that it hangs from.
-    nodes: Vec<usize>,
 }
