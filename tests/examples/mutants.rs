@@ -119,7 +119,7 @@ fn again(name: &str, (seed, index): (&str, &str), folder: Option<&str>) -> Optio
             if written.is_some() { "" } else { ", not written" }
         );
     }
-    println!("{:?} (allowed: {MAX_SECONDS} s)", reader.read(&mutant, folder, index));
+    println!("{:?} (allowed: {MAX_SECONDS} s)", reader.read(&mutant, index));
     Some(true)
 }
 

@@ -32,12 +32,33 @@ pub struct Tally {
     pub n_accepted: usize,
     /// How many were refused, by code.
     pub refused: BTreeMap<String, usize>,
-    /// Panics, and what took too long or too much: the mutant, and what it did.
-    pub failures: Vec<(u32, String)>,
+    /// The mutants that did what none may, and what that was.
+    pub failures: Vec<(u32, Failure)>,
     /// The longest time in seconds, and its mutant.
     pub slowest: (f64, u32),
     /// The most memory in bytes, and its mutant.
     pub largest: (usize, u32),
+}
+
+/// What no mutant may do.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Failure {
+    /// The reader panicked, with this message.
+    Panic(String),
+    /// It took so many seconds.
+    Slow(f64),
+    /// It held so many bytes at its peak.
+    Large(usize),
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Panic(message) => write!(f, "panic: {message}"),
+            Self::Slow(seconds) => write!(f, "{seconds:.1} s"),
+            Self::Large(bytes) => write!(f, "{} MB at its peak", bytes >> 20),
+        }
+    }
 }
 
 /// The mutant that a seed number and an index make.
@@ -47,17 +68,12 @@ pub fn mutant(reader: &Reader, seed: u64, index: u32) -> Mutant {
 }
 
 /// Reads a range of mutants.
-///
-/// # Panics
-/// If no folder for temporary files can be made.
 #[must_use]
-#[allow(clippy::expect_used, reason = "a helper of tests")]
 pub fn run(reader: &Reader, seed: u64, range: Range<u32>, watch: &Watch) -> Tally {
-    let folder = tempfile::tempdir().expect("a folder");
     let mut tally = Tally::default();
     for index in range {
         let mutant = reader.mutant(seed, index);
-        let seen = watched(reader, &mutant, folder.path(), (index, watch));
+        let seen = watched(reader, &mutant, (index, watch));
         tally.add(index, seen);
     }
     tally
@@ -71,27 +87,22 @@ struct Seen {
     peak_bytes: usize,
 }
 
-fn watched(
-    reader: &Reader,
-    mutant: &Mutant,
-    folder: &std::path::Path,
-    (index, watch): (u32, &Watch),
-) -> Seen {
-    let mut seen = once(reader, mutant, folder, (index, watch));
+fn watched(reader: &Reader, mutant: &Mutant, (index, watch): (u32, &Watch)) -> Seen {
+    let mut seen = once(reader, mutant, (index, watch));
     for _ in 0..3 {
         if seen.seconds > MAX_SECONDS {
-            seen.seconds = once(reader, mutant, folder, (index, watch)).seconds.min(seen.seconds);
+            seen.seconds = once(reader, mutant, (index, watch)).seconds.min(seen.seconds);
         }
     }
     seen
 }
 
 #[allow(clippy::disallowed_methods, reason = "what is measured is time")]
-fn once(reader: &Reader, mutant: &Mutant, folder: &std::path::Path, (index, watch): (u32, &Watch)) -> Seen {
+fn once(reader: &Reader, mutant: &Mutant, (index, watch): (u32, &Watch)) -> Seen {
     PeakAlloc.reset_peak_usage();
     let (held, started) = (PeakAlloc.current_usage(), Instant::now());
     watch.begin(index);
-    let read = catch_unwind(AssertUnwindSafe(|| reader.read(mutant, folder, index)));
+    let read = catch_unwind(AssertUnwindSafe(|| reader.read(mutant, index)));
     watch.end();
     Seen {
         outcome: read.map_err(|panic| {
@@ -109,13 +120,13 @@ impl Tally {
         match seen.outcome {
             Ok(Ok(())) => self.n_accepted += 1,
             Ok(Err(code)) => *self.refused.entry(code).or_default() += 1,
-            Err(panic) => self.failures.push((index, format!("panic: {panic}"))),
+            Err(panic) => self.failures.push((index, Failure::Panic(panic))),
         }
         if seen.seconds > MAX_SECONDS {
-            self.failures.push((index, format!("{:.1} s", seen.seconds)));
+            self.failures.push((index, Failure::Slow(seen.seconds)));
         }
         if seen.peak_bytes > MAX_PEAK_BYTES {
-            self.failures.push((index, format!("{} MB at its peak", seen.peak_bytes >> 20)));
+            self.failures.push((index, Failure::Large(seen.peak_bytes)));
         }
         if seen.seconds > self.slowest.0 {
             self.slowest = (seen.seconds, index);

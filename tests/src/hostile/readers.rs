@@ -2,10 +2,9 @@
 //!
 //! **Output** [`readers`]: each with seeds, and a function that reads a mutant as the program would.
 //! **Guarantees** what is accepted is within the limit that was stated; what is refused says so in a message that fits
-//! a terminal.
+//! a terminal. A reader of files finds those of its mutant and no others, so that what came before decides nothing.
 
-use std::fs;
-use std::path::Path;
+use std::{fs, io};
 
 use espalier_geom::random::{Purpose, Stream};
 use espalier_model::swc::{self, SwcScale};
@@ -25,8 +24,8 @@ const MAX_MESSAGE_BYTES: usize = 4096;
 /// What came of a mutant: accepted, or the code of the error.
 type Outcome = Result<(), String>;
 
-/// What reads the files of a mutant, which may be written to the folder; the number varies how.
-type Read = dyn Fn(&Mutant, &Path, u32) -> Outcome;
+/// What reads the files of a mutant; the number varies how.
+type Read = dyn Fn(&Mutant, u32) -> Outcome;
 
 /// A reader.
 pub struct Reader {
@@ -37,17 +36,13 @@ pub struct Reader {
 }
 
 impl Reader {
-    fn new(
-        name: &'static str,
-        seeds: Vec<Seed>,
-        read: impl Fn(&Mutant, &Path, u32) -> Outcome + 'static,
-    ) -> Self {
+    fn new(name: &'static str, seeds: Vec<Seed>, read: impl Fn(&Mutant, u32) -> Outcome + 'static) -> Self {
         Self { name, seeds, read: Box::new(read) }
     }
 
     /// A reader of bytes.
     fn of_bytes(name: &'static str, seeds: Vec<Seed>, read: impl Fn(&[u8]) -> Outcome + 'static) -> Self {
-        Self::new(name, seeds, move |mutant, _, _| read(&mutant.files[0].1))
+        Self::new(name, seeds, move |mutant, _| read(&mutant.files[0].1))
     }
 
     /// A reader of text; what is no UTF-8 never reaches it.
@@ -72,8 +67,8 @@ impl Reader {
     ///
     /// # Panics
     /// Where the reader does, and where its message is too long.
-    pub fn read(&self, mutant: &Mutant, folder: &Path, index: u32) -> Result<(), String> {
-        (self.read)(mutant, folder, index)
+    pub fn read(&self, mutant: &Mutant, index: u32) -> Result<(), String> {
+        (self.read)(mutant, index)
     }
 
     /// A seed with another first file.
@@ -144,10 +139,9 @@ pub fn readers() -> Vec<Reader> {
 
 /// A reader of volumes, in each of the ways in which they are read.
 fn volume(name: &'static str, seeds: Vec<Seed>) -> Reader {
-    Reader::new(name, seeds, |mutant, folder, index| {
-        for (name, bytes) in &mutant.files {
-            fs::write(folder.join(name), bytes).map_err(|error| error.to_string())?;
-        }
+    Reader::new(name, seeds, |mutant, index| {
+        let written = written(mutant).map_err(|error| error.to_string())?;
+        let folder = written.path();
         let is_series = mutant.files.len() > 2;
         let path = if is_series && index & 1 == 0 { folder } else { &folder.join(mutant.files[0].0) };
         let options = ReadOptions {
@@ -175,6 +169,15 @@ fn volume(name: &'static str, seeds: Vec<Seed>) -> Reader {
             }
         }
     })
+}
+
+/// A folder with the files of a mutant, which goes with the value.
+fn written(mutant: &Mutant) -> io::Result<tempfile::TempDir> {
+    let folder = tempfile::tempdir()?;
+    for (name, bytes) in &mutant.files {
+        fs::write(folder.path().join(name), bytes)?;
+    }
+    Ok(folder)
 }
 
 fn polylines(bytes: &[u8]) -> Outcome {
