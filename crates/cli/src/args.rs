@@ -396,14 +396,16 @@ Options of the command line have the last word over all rows.
 
 Does one scan after the other, and then DIR/group/group.html. A scan that fails stops no other: DIR/failures.tsv has the
 reason and the command that tries it again. The same command again does only what is missing, has failed, or has other
-settings or files now. The exit code is that of the first scan that failed.
+settings or files now. The exit code is that of the first scan that failed. Two such calls at once in one folder: one goes on,
+the other ends with exit code 75, or waits with --wait; calls with --only may run beside each other.
 pipelines/cohort/Snakefile does the same with many jobs at once, here or on a cluster.
 
 Examples:
   espalier cohort samples.tsv -o out/cohort
   espalier cohort samples.tsv -o out/cohort --config airway.toml --set embed.w_angle=3
   espalier cohort samples.tsv -o out/cohort --only case-07      one scan, without the page
-  espalier cohort samples.tsv -o out/cohort --group             the page alone, from what is there
+  espalier cohort samples.tsv -o out/cohort --group             the page alone, from what is there: with the options that
+                                                                the scans were done with, or they do not count
   espalier cohort samples.tsv -o out/cohort --list              the scans as JSON, for programs that do them";
 
 /// `espalier cohort`.
@@ -443,6 +445,8 @@ with dataset_description.json; run folders are named in .bidsignore.
 If the volumes have more than one suffix (mask, dseg, ct, ...), --suffix says which are meant. The data set must have a
 dataset_description.json, and volumes be named as their folders are, unless --skip-bids-validation is given. Participants
 may be done by jobs of their own, at the same time. The exit code is that of the first volume that failed.
+group takes the same --suffix, --filter, --config, --set and other options as participant did: a volume that was done with
+other settings does not count as done.
 
 Examples:
   espalier bids data data/derivatives/espalier participant --suffix mask

@@ -2,7 +2,7 @@
 
 use espalier_pipeline::event_lines::{Failure, Line};
 use espalier_pipeline::{
-    BidsRequest, Cohort, CohortPage, CohortRequest, Effort, FailedSample, PageRequest, Sample, Turn,
+    BidsRequest, Cohort, CohortPage, CohortRequest, Effort, FailedSample, PageRequest, Sample, Turn, Word,
 };
 use serde_json::json;
 
@@ -17,20 +17,27 @@ pub(crate) fn execute(arguments: &Arguments, cohort: &CohortArguments) -> anyhow
         table: cohort.table.clone(),
         out: cohort.out.clone(),
         config: cohort.config.clone(),
+        only: cohort.only.clone(),
         overrides: arguments.common.overrides.clone(),
+        options: options(arguments, cohort.rerun),
         data_dir: data_dir(),
     };
-    let all = Cohort::read(&request)?;
+    let scans = Cohort::read(&request)?;
     let effort = effort(arguments, cohort.rerun);
-    if !cohort.only.is_empty() {
-        let chosen = all.only(&cohort.only)?;
-        return if cohort.list { print_list(&chosen, &effort) } else { perform(arguments, &chosen, &effort) };
-    }
     if cohort.list {
-        return print_list(&all, &effort);
+        progress::result(scans.list(&effort).trim_end());
+        return Ok(());
     }
-    let done = if cohort.group { Ok(()) } else { perform(arguments, &all, &effort) };
-    print_page(arguments, &all, &cohort.page)?;
+    if cohort.group {
+        return print_page(arguments, &scans, (&cohort.page, effort.wait));
+    }
+    let show = Progress::new(&arguments.common);
+    let _held = scans.hold(effort.wait, &|event| show.show(event))?;
+    let done = perform(arguments, &scans, &effort);
+    if cohort.only.is_empty() {
+        // Hours of work do not end with that somebody else looks at the page just now.
+        print_page(arguments, &scans, (&cohort.page, true))?;
+    }
     done
 }
 
@@ -46,15 +53,42 @@ pub(crate) fn execute_bids(arguments: &Arguments, bids: &BidsArguments) -> anyho
         skip_validation: bids.skip_bids_validation,
         config: bids.config.clone(),
         overrides: arguments.common.overrides.clone(),
+        options: options(arguments, bids.rerun),
         data_dir: data_dir(),
     })?;
+    let effort = effort(arguments, bids.rerun);
     if bids.level == "group" {
-        return print_page(arguments, &cohort, &bids.page);
+        return print_page(arguments, &cohort, (&bids.page, effort.wait));
     }
+    let show = Progress::new(&arguments.common);
+    let _held = cohort.hold(effort.wait, &|event| show.show(event))?;
     for absent in &cohort.absent {
         progress::line(&format!("note: {}: {}", absent.id, absent.reason));
     }
-    perform(arguments, &cohort, &effort(arguments, bids.rerun))
+    perform(arguments, &cohort, &effort)
+}
+
+/// The options that no result depends on, as they were given.
+fn options(arguments: &Arguments, rerun: Rerun) -> Vec<Word> {
+    let common = &arguments.common;
+    let option = |name: &str, value: Option<String>| {
+        value.map(|value| [Word::Text(name.to_owned()), Word::Text(value)]).into_iter().flatten()
+    };
+    let mut words: Vec<Word> = option("--threads", common.threads.map(|n| n.to_string())).collect();
+    words.extend(option("--max-memory", common.max_memory.map(size)));
+    if let Some(folder) = &common.cache {
+        words.extend([Word::Text("--cache".to_owned()), Word::Path(folder.clone())]);
+        words.extend(option("--cache-size", Some(size(common.cache_size))));
+    }
+    words.extend(rerun.wait.then(|| Word::Text("--wait".to_owned())));
+    words
+}
+
+/// A number of bytes as an option takes it.
+fn size(n_bytes: u64) -> String {
+    let units = [(30, "G"), (20, "M"), (10, "K")];
+    let unit = units.into_iter().find(|(shift, _)| n_bytes.is_multiple_of(1 << shift));
+    unit.map_or_else(|| n_bytes.to_string(), |(shift, name)| format!("{}{name}", n_bytes >> shift))
 }
 
 /// How scans are done.
@@ -68,11 +102,6 @@ fn effort(arguments: &Arguments, rerun: Rerun) -> Effort {
         wait,
         cache: cache(arguments),
     }
-}
-
-fn print_list(cohort: &Cohort, effort: &Effort) -> anyhow::Result<()> {
-    progress::result(cohort.list(effort).trim_end());
-    Ok(())
 }
 
 /// Does the scans; of each its id, how it goes, and its digest or its error.
@@ -109,13 +138,18 @@ fn tell(sample: &Sample, turn: Turn<'_>) {
 }
 
 /// Makes the page and prints what it says of failures.
-fn print_page(arguments: &Arguments, cohort: &Cohort, page: &PageArguments) -> anyhow::Result<()> {
+fn print_page(
+    arguments: &Arguments,
+    cohort: &Cohort,
+    (page, wait): (&PageArguments, bool),
+) -> anyhow::Result<()> {
     let request = PageRequest {
         title: page.title.clone(),
         is_anonymous: page.anonymous,
         threads: arguments.common.threads.map(usize::from),
+        wait,
     };
-    let CohortPage { table, failed, failures_file, summary } = cohort.page(&request)?;
+    let CohortPage { table, failed, n_other_settings, failures_file, summary } = cohort.page(&request)?;
     if arguments.common.json {
         let of_scan = |failed: &FailedSample| {
             let FailedSample { id, code, reason, done_to, retry } = failed;
@@ -124,6 +158,7 @@ fn print_page(arguments: &Arguments, cohort: &Cohort, page: &PageArguments) -> a
         let mut parts = summary::of(&summary);
         parts.insert("failures_file".to_owned(), failures_file.display().to_string().into());
         parts.insert("failed".to_owned(), failed.iter().map(of_scan).collect());
+        parts.insert("n_other_settings".to_owned(), n_other_settings.into());
         summary::print_json(parts);
         return Ok(());
     }
@@ -131,6 +166,12 @@ fn print_page(arguments: &Arguments, cohort: &Cohort, page: &PageArguments) -> a
     for failed in &failed {
         let retry = failed.retry.as_ref().map(|retry| format!("\n    {retry}")).unwrap_or_default();
         progress::result(&format!("{}  {}  {}{retry}", failed.id, failed.code, failed.reason));
+    }
+    if n_other_settings > 0 {
+        progress::line(&format!(
+            "note: scans that were done with other settings, and do not count: {n_other_settings}; the page takes the \
+             --config, --set and other options that they were done with"
+        ));
     }
     progress::result(&failures_file.display().to_string());
     summary::print(&summary, false);

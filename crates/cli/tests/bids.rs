@@ -155,6 +155,24 @@ fn what_is_not_clear_is_refused() {
     assert_eq!(said.code, Some(0), "{}", said.error);
     assert!(said.out.contains("E-GROUP-NO-RUN"), "{}", said.out);
 
+    // A list that cannot be read is not an empty one.
+    let list = at.join("in/participants.tsv");
+    let whole = fs::read(&list).expect("a list");
+    let group = ["in", "out", "group", "--suffix", "mask"];
+    fs::write(&list, "participant\tage\nsub-01\t40\n").expect("writable");
+    refused(&group, 3, "in/participants.tsv: it has no column participant_id");
+    assert_eq!(bids(at, &[&group[..], &["--skip-bids-validation"]].concat()).code, Some(0));
+    fs::remove_file(&list).expect("removed");
+    fs::create_dir(&list).expect("a folder");
+    refused(&group, 74, "cannot read in/participants.tsv");
+    fs::remove_dir(&list).expect("removed");
+    fs::File::create(&list).and_then(|file| file.set_len((16 << 20) + 1)).expect("a long file");
+    refused(&group, 5, "in/participants.tsv has 16777217 bytes, allowed are 16777216");
+    // What is not UTF-8 stands in other columns.
+    fs::write(&list, b"participant_id\tname\nsub-01\tM\xfcller\nsub-09\tx\n").expect("writable");
+    assert!(bids(at, &group).out.contains("sub-09"));
+    fs::write(&list, whole).expect("writable");
+
     fs::write(at.join("in/sub-02/anat/sub-05_desc-bar_mask.nii.gz"), mask(false)).expect("writable");
     refused(&["in", "out", "group", "--suffix", "mask"], 3, "its name is not that of sub-02");
     fs::remove_file(at.join("in/dataset_description.json")).expect("removed");

@@ -206,6 +206,155 @@ fn no_path_of_the_machine_is_on_the_page() {
     assert!(rows(&out.join("failures.tsv"))[0][4].contains(&table.display().to_string()));
 }
 
+#[test]
+fn a_result_that_is_gone_or_cut_is_not_done() {
+    let folder = data();
+    let at = folder.path();
+    assert_eq!(cohort(at, &["data/samples.tsv", "-o", "out", "--only", "a,d"]).code, Some(0));
+    let done = |file: &str| {
+        let text = fs::read_to_string(at.join("out/runs/a").join(file)).expect("a result");
+        let is_done = || list(at, &[])[0]["done"] == Value::Bool(true);
+        assert!(is_done(), "{file}");
+        fs::write(at.join("out/runs/a").join(file), &text[..text.len() / 2]).expect("writable");
+        let is_done_cut = is_done();
+        fs::remove_file(at.join("out/runs/a").join(file)).expect("removed");
+        let is_done_without = is_done();
+        assert_eq!(list(at, &[])[0]["altered"], Value::Bool(true));
+        assert_eq!(
+            list(at, &["--set", "seed=9"])[0]["altered"],
+            Value::Bool(false),
+            "other settings are no damage"
+        );
+        let page = cohort(at, &["data/samples.tsv", "-o", "out", "--group"]);
+        assert!(page.out.contains(&format!("done before, but {file} is gone since")), "{}", page.out);
+        fs::write(at.join("out/runs/a").join(file), text).expect("writable");
+        (is_done_cut, is_done_without)
+    };
+    for file in ["nodes.tsv", "planar.svg", "stages/07-render/report.json"] {
+        assert_eq!(done(file), (false, false), "{file}");
+    }
+    fs::remove_file(at.join("out/runs/a/planar.svg")).expect("removed");
+    let again = cohort(at, &["data/samples.tsv", "-o", "out", "--only", "a,d"]);
+    assert_eq!(again.code, Some(0), "{}", again.error);
+    assert!(again.error.contains("embed        kept") && at.join("out/runs/a/planar.svg").exists());
+    assert_eq!(list(at, &["--only", "a"])[0]["done"], Value::Bool(true));
+}
+
+#[test]
+fn of_two_calls_at_once_one_goes_on() {
+    let folder = data();
+    let at = folder.path();
+    let table = "id\tpath\tinput.unit\na\tone.swc\tmm\nb\ttwo.swc\tmm\nc\tone.swc\tmm\n";
+    fs::write(at.join("data/samples.tsv"), table).expect("writable");
+    let call = |more: &[&str]| cohort(at, &[&["data/samples.tsv", "-o", "out"], more].concat());
+    let both = |more: &[&str]| {
+        let codes: Vec<Option<i32>> = std::thread::scope(|scope| {
+            let calls = [scope.spawn(|| call(more)), scope.spawn(|| call(more))];
+            calls.into_iter().map(|call| call.join().expect("a thread").code).collect()
+        });
+        fs::remove_dir_all(at.join("out")).expect("removed");
+        codes
+    };
+    assert_eq!(both(&["--wait"]), [Some(0), Some(0)]);
+    // The second may begin when the first is done.
+    let codes = both(&[]);
+    assert!(
+        codes.contains(&Some(0)) && codes.iter().all(|code| [Some(0), Some(75)].contains(code)),
+        "{codes:?}"
+    );
+    // Somebody holds the folder, as a call that does all scans would.
+    fs::create_dir(at.join("out")).expect("folder");
+    let lock = fs::File::create(at.join("out/.lock")).expect("a file");
+    lock.lock().expect("a lock");
+    let refused = call(&[]);
+    assert_eq!(refused.code, Some(75), "{}", refused.error);
+    assert!(
+        refused.error.contains("error[E-RUN-LOCKED]: another run is at work in out"),
+        "{}",
+        refused.error
+    );
+    // One scan alone, a list, a page: none of them is in the way.
+    for more in [&["--only", "b"][..], &["--list"], &["--group"]] {
+        assert_eq!(call(more).code, Some(0), "{more:?}");
+    }
+}
+
+#[test]
+fn the_same_table_elsewhere_has_the_same_scans() {
+    let folder = data();
+    let at = folder.path();
+    let table = "id\tpath\tinput.unit\tembed.edits\na\tone.swc\tmm\tedits.json\nb\ttwo.swc\tmm\t\n";
+    fs::write(at.join("data/samples.tsv"), table).expect("writable");
+    fs::create_dir(at.join("other")).expect("folder");
+    fs::rename(at.join("data"), at.join("other/moved")).expect("moved");
+    let settings = |table: &str, more: &[&str]| {
+        let said = cohort(at, &[&[table, "-o", "out", "--list"], more].concat());
+        assert_eq!(said.code, Some(0), "{}", said.error);
+        let list: Value = serde_json::from_str(&said.out).expect("JSON");
+        let samples = list["samples"].as_array().expect("samples").clone();
+        samples.iter().map(|sample| sample["settings"].clone()).collect::<Vec<_>>()
+    };
+    let moved = settings("other/moved/samples.tsv", &[]);
+    let named = settings("other/moved/samples.tsv", &["--image", "other/moved/ct.nii"]);
+    fs::rename(at.join("other/moved"), at.join("data")).expect("moved");
+    assert_eq!(settings("data/samples.tsv", &[]), moved);
+    assert_eq!(settings("data/samples.tsv", &["--image", "data/ct.nii"]), named);
+    assert_ne!(settings("data/samples.tsv", &["--image", "data/other.nii"]), named);
+    fs::write(at.join("data/samples.tsv"), table.replace("edits.json", "others.json")).expect("writable");
+    let other = settings("data/samples.tsv", &[]);
+    assert!(other[0] != moved[0] && other[1] == moved[1], "another file beside is another scan");
+}
+
+#[test]
+fn a_call_for_one_scan_reads_its_own_config_alone() {
+    let folder = data();
+    let at = folder.path();
+    fs::write(at.join("data/good.toml"), "schema = 1\n[input]\nunit = \"mm\"\n").expect("writable");
+    fs::write(at.join("data/bad.toml"), "schema = 1\nbogus = 1\n").expect("writable");
+    let table = "id\tpath\tconfig\na\tone.swc\tgood.toml\nb\ttwo.swc\tbad.toml\n";
+    fs::write(at.join("data/samples.tsv"), table).expect("writable");
+    let call = |more: &[&str]| cohort(at, &[&["data/samples.tsv", "-o", "out"], more].concat());
+    let whole = call(&["--list"]);
+    assert_eq!(whole.code, Some(2), "{}", whole.error);
+    assert_eq!(list(at, &["--only", "a"]).len(), 1);
+    let only = call(&["--only", "a"]);
+    assert_eq!(only.code, Some(0), "{}", only.error);
+    assert_eq!(call(&["--only", "b"]).code, Some(2));
+}
+
+#[test]
+fn a_problem_of_the_table_comes_with_its_way_out_and_a_retry_with_its_options() {
+    let folder = data();
+    let at = folder.path();
+    fs::write(at.join("data/lost.tsv"), "id\tpath\na\t$ESPALIER_DATA/x.nii\n").expect("writable");
+    let said = cohort(at, &["data/lost.tsv", "-o", "out"]);
+    assert!(said.error.contains("\n    hint: set it to the folder of the data"), "{}", said.error);
+
+    let options = ["--threads", "2", "--max-memory", "2G", "--cache", "a store", "--wait"];
+    let said = cohort(at, &[&["data/samples.tsv", "-o", "out", "--only", "b"][..], &options].concat());
+    assert_eq!(said.code, Some(74), "{}", said.error);
+    let page = cohort(at, &[&["data/samples.tsv", "-o", "out", "--group"][..], &options].concat());
+    assert_eq!(page.code, Some(0), "{}", page.error);
+    let retry = &rows(&at.join("out/failures.tsv"))[1][4];
+    let expected = " --threads 2 --max-memory 2G --cache 'a store' --cache-size 20G --wait --only b";
+    assert!(retry.ends_with(expected), "{retry}");
+}
+
+#[test]
+fn a_page_asked_for_with_other_settings_says_so() {
+    let folder = data();
+    let at = folder.path();
+    assert_eq!(cohort(at, &["data/samples.tsv", "-o", "out", "--only", "a,d"]).code, Some(0));
+    let page = cohort(at, &["data/samples.tsv", "-o", "out", "--group", "--set", "seed=9"]);
+    assert!(
+        page.error.contains("note: scans that were done with other settings, and do not count: 2;"),
+        "{}",
+        page.error
+    );
+    let page = cohort(at, &["data/samples.tsv", "-o", "out", "--group"]);
+    assert!(!page.error.contains("other settings"), "{}", page.error);
+}
+
 /// What pipelines/cohort calls is what there is; whether Snakemake runs it, `scripts/cohort` tells.
 #[test]
 fn the_snakefile_asks_for_what_there_is() {
@@ -237,7 +386,7 @@ fn the_snakefile_asks_for_what_there_is() {
     let listed = espalier(&root, &["cohort", "pipelines/cohort/samples.tsv", "-o", out, "--list"]);
     let list: Value = serde_json::from_slice(&listed.stdout).expect("JSON");
     assert_eq!(list["samples"].as_array().map(Vec::len), Some(3), "{}", stderr(&listed));
-    for key in ["id", "files", "settings", "done_file"] {
+    for key in ["id", "files", "settings", "done_file", "altered"] {
         assert!(list["samples"][0].get(key).is_some(), "{key}");
     }
     assert!(snakefile.contains("/provenance/sample.json"), "the file that says that a scan is done");

@@ -135,6 +135,15 @@ impl RunFolder {
         self.digests.keys().any(|file| file.starts_with(place))
     }
 
+    /// The files that the folder vouches for, with their lengths in bytes as they are now; none of one that is not there.
+    pub(crate) fn sizes(&self) -> BTreeMap<String, Option<u64>> {
+        let size = |file: &String| {
+            let entry = fs::metadata(self.path.join(file)).ok().filter(fs::Metadata::is_file);
+            (file.clone(), entry.map(|entry| entry.len()))
+        };
+        self.digests.keys().map(size).collect()
+    }
+
     /// The digest of a file as it lies there now; none if there is none.
     pub(crate) fn digest_if_there(&self, relative: &str) -> Result<Option<String>, Error> {
         let path = self.path.join(relative);

@@ -76,7 +76,7 @@ mod verify;
 pub use bids::{BidsRequest, bids};
 pub use cache::Cache;
 pub use cohort::{
-    Absent, Cohort, CohortPage, CohortRequest, Effort, FailedSample, PageRequest, Sample, Turn,
+    Absent, Cohort, CohortPage, CohortRequest, Effort, FailedSample, Hold, PageRequest, Sample, Turn, Word,
 };
 pub use compare::{CompareRequest, Compared, Subject, compare};
 pub use config::{Config, ConfigError, Loaded, Override};

@@ -3,7 +3,7 @@
 //! **Input** the folder. **Output** its participants with their sessions, and every volume below them.
 //! **Steps** 1. `sub-*`, and in each `ses-*` if there are any. 2. Below each, every `.nii` and `.nii.gz`.
 //! **Guarantees** sorted by path; no folder deeper than [`DEEPEST`] is looked at, and none that begins with a dot, so that a
-//! link to a folder above ends nowhere.
+//! link to a folder above ends nowhere. At [`MOST_FILES`] volumes the search ends.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use crate::error::Error;
 
 /// How many folders a file may lie below that of its session: `anat/`, or what lies in it.
 const DEEPEST: usize = 3;
-/// The most volumes of a data set.
+/// The most volumes of a data set: ten times what a page shows.
 const MOST_FILES: usize = 100_000;
 
 /// A participant, or one session of it.
@@ -70,8 +70,19 @@ fn labelled(folder: &Path, key: &str) -> Result<Vec<(String, PathBuf)>, Error> {
     Ok(entries.filter_map(labelled).collect())
 }
 
-/// Every volume of a visit.
-pub(super) fn scans(visit: &Visit) -> Result<Vec<Scan>, Error> {
+/// Every volume of each visit of the data set.
+pub(super) fn scans(visits: &[Visit]) -> Result<Vec<(&Visit, Vec<Scan>)>, Error> {
+    let (mut found, mut n_found) = (Vec::with_capacity(visits.len()), 0);
+    for visit in visits {
+        let scans = scans_of(visit, n_found, MOST_FILES)?;
+        n_found += scans.len();
+        found.push((visit, scans));
+    }
+    Ok(found)
+}
+
+/// Every volume of a visit, where so many were found before, and so many may be in all.
+fn scans_of(visit: &Visit, n_before: usize, limit: usize) -> Result<Vec<Scan>, Error> {
     let mut scans = Vec::new();
     let mut folders = vec![(visit.folder.clone(), PathBuf::new(), 0)];
     while let Some((folder, between, depth)) = folders.pop() {
@@ -86,8 +97,9 @@ pub(super) fn scans(visit: &Visit) -> Result<Vec<Scan>, Error> {
                 scans.push(Scan { path, between: between.clone(), name });
             }
         }
-        if scans.len() > MOST_FILES {
-            return Err(Error::GroupSize { n_runs: scans.len(), limit: MOST_FILES });
+        let n_runs = n_before + scans.len();
+        if n_runs > limit {
+            return Err(Error::GroupSize { n_runs, limit });
         }
     }
     scans.sort_by(|a, b| a.path.cmp(&b.path));
@@ -101,4 +113,20 @@ fn sorted(folder: &Path) -> Result<Vec<PathBuf>, Error> {
         entries.map(|entry| Ok(entry.map_err(read)?.path())).collect::<Result<_, Error>>()?;
     paths.sort();
     Ok(paths)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn volumes_are_counted_over_all_visits() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for file in ["sub-01_mask.nii", "sub-01_ct.nii.gz", "sub-01_ct.json"] {
+            fs::write(folder.path().join(file), "").expect("a file");
+        }
+        let visit = Visit { participant: "01".to_owned(), session: None, folder: folder.path().to_owned() };
+        assert_eq!(scans_of(&visit, 3, 5).expect("volumes").len(), 2);
+        assert!(matches!(scans_of(&visit, 4, 5), Err(Error::GroupSize { n_runs: 6, limit: 5 })));
+    }
 }

@@ -2,7 +2,7 @@
 //!
 //! | step | file | what |
 //! |--:|---|---|
-//! | 1 | `find`, `name` | participants, sessions, and the volumes below them |
+//! | 1 | `find`, `name`, `participants` | participants, sessions, and the volumes below them |
 //! | 2 | this file | which of them are meant, and where the results of each go |
 //! | 3 | `description` | what the data set says of itself, and what ours says |
 //! | 4 | [`cohort`](crate::cohort) | doing them, and the page |
@@ -16,17 +16,19 @@
 mod description;
 mod find;
 mod name;
+mod participants;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::cohort::{Absent, Cohort, Sample};
+use crate::cohort::{Absent, Cohort, Retry, Sample, Word, written};
 use crate::config::{Loaded, Override};
 use crate::error::Error;
 use crate::run;
-use crate::shell;
 use find::{Scan, Visit};
+
+/// How many of the labels that there are a message names.
+const MOST_LABELS: usize = 50;
 
 /// A BIDS data set as it is asked for.
 #[derive(Clone, Debug, Default)]
@@ -49,6 +51,8 @@ pub struct BidsRequest {
     pub config: Option<PathBuf>,
     /// What the command line changes.
     pub overrides: Vec<Override>,
+    /// Other options of the command line, as the commands repeat them that do a participant alone.
+    pub options: Vec<Word>,
     /// What `$ESPALIER_DATA` stands for.
     pub data_dir: Option<PathBuf>,
 }
@@ -63,20 +67,20 @@ pub fn bids(request: &BidsRequest) -> Result<Cohort, Error> {
         description::check(&request.input)?;
     }
     let visits = find::visits(&request.input)?;
-    let mut found: Vec<(&Visit, Vec<Scan>)> = Vec::with_capacity(visits.len());
-    for visit in &visits {
-        let mut scans = find::scans(visit)?;
-        scans.retain(|scan| fits(request, scan));
-        found.push((visit, scans));
-    }
+    let mut found = find::scans(&visits)?;
+    found.iter_mut().for_each(|(_, scans)| scans.retain(|scan| fits(request, scan)));
     let suffix = suffix(request, &found)?;
     for (visit, scans) in &mut found {
         scans.retain(|scan| scan.name.suffix == suffix);
         check(request, visit, scans)?;
     }
-    let listed = participants_listed(&request.input);
+    let listed = match participants::listed(&request.input) {
+        Err(Error::BidsDataset { .. }) if request.skip_validation => BTreeSet::new(),
+        listed => listed?,
+    };
     check_labels(request, &visits, &listed)?;
-    let mut cohort = Cohort::new(request.out.clone());
+    let is_whole = request.participants.is_empty() && request.sessions.is_empty();
+    let mut cohort = Cohort::new(request.out.clone(), is_whole);
     for (visit, scans) in found.iter().filter(|(visit, _)| is_asked_for(request, visit)) {
         for scan in scans {
             cohort.samples.push(sample(request, visit, scan)?);
@@ -88,9 +92,9 @@ pub fn bids(request: &BidsRequest) -> Result<Cohort, Error> {
             ));
         }
     }
-    let is_there = |label: &String| visits.iter().any(|visit| visit.participant == *label);
+    let there: BTreeSet<&str> = visits.iter().map(|visit| visit.participant.as_str()).collect();
     let is_meant = |label: &String| is_chosen(&request.participants, "sub", label);
-    for label in listed.iter().filter(|label| is_meant(label) && !is_there(label)) {
+    for label in listed.iter().filter(|label| is_meant(label) && !there.contains(label.as_str())) {
         cohort.absent.push(absent(
             format!("sub-{label}"),
             "in participants.tsv, but there is no such folder".to_owned(),
@@ -169,18 +173,6 @@ fn check(request: &BidsRequest, visit: &Visit, scans: &[Scan]) -> Result<(), Err
     Ok(())
 }
 
-/// The labels in `participants.tsv`, if it is there.
-fn participants_listed(root: &Path) -> BTreeSet<String> {
-    let text = fs::read_to_string(root.join("participants.tsv")).unwrap_or_default();
-    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
-    let mut lines = text.lines();
-    let column =
-        lines.next().and_then(|heads| heads.split('\t').position(|head| head.trim() == "participant_id"));
-    let cells = column.map(|at| lines.filter_map(move |line| line.split('\t').nth(at)));
-    let labels = cells.into_iter().flatten().filter_map(|cell| name::label(cell.trim(), "sub"));
-    labels.map(str::to_owned).collect()
-}
-
 /// Participants and sessions that are asked for must be there.
 fn check_labels(request: &BidsRequest, visits: &[Visit], listed: &BTreeSet<String>) -> Result<(), Error> {
     let mut participants = listed.clone();
@@ -192,7 +184,9 @@ fn check_labels(request: &BidsRequest, visits: &[Visit], listed: &BTreeSet<Strin
     ] {
         for label in asked.iter().map(|label| plain(label, key)) {
             if !known.contains(label) {
-                let there = known.into_iter().collect::<Vec<_>>().join(", ");
+                let n_more = known.len().saturating_sub(MOST_LABELS);
+                let more = if n_more > 0 { format!(" and {n_more} more") } else { String::new() };
+                let there = known.into_iter().take(MOST_LABELS).collect::<Vec<_>>().join(", ") + &more;
                 return Err(Error::NoBidsLabel { what, label: label.to_owned(), there });
             }
         }
@@ -228,7 +222,9 @@ fn sample(request: &BidsRequest, visit: &Visit, scan: &Scan) -> Result<Sample, E
     };
     run::source_of(&loaded, request.data_dir.as_deref())?;
     let place = Path::new(&visit.relative()).join(&scan.between).join(&scan.name.stem);
-    let (retry, retry_shown) = retries(request, visit);
+    // Where the data set lies says nothing of what is in it.
+    let mut written = written(&loaded.config, &request.input, &[&request.overrides]);
+    written.insert("input.path", place.to_string_lossy().into_owned());
     Ok(Sample {
         id: if request.skip_validation {
             place.to_string_lossy().into_owned()
@@ -238,28 +234,24 @@ fn sample(request: &BidsRequest, visit: &Visit, scan: &Scan) -> Result<Sample, E
         out: request.out.join(&place),
         loaded,
         config_file: request.config.clone(),
-        written: place.to_string_lossy().into_owned(),
-        retry,
-        retry_shown,
+        written,
+        retry: Retry::of(|path| words(request, visit, path)),
     })
 }
 
-/// The commands that do a participant, or its session, alone.
-fn retries(request: &BidsRequest, visit: &Visit) -> (String, String) {
-    let command = |path: &dyn Fn(&Path) -> String| {
-        let word = |path: String| shell::word(&path);
-        let mut words =
-            vec!["espalier bids".to_owned(), word(path(&request.input)), word(path(&request.out))];
-        words.push(format!("participant --participant-label {}", visit.participant));
-        words.extend(visit.session.iter().map(|session| format!("--session-label {session}")));
-        words.extend(request.suffix.iter().map(|suffix| format!("--suffix {}", shell::word(suffix))));
-        let filter =
-            |(key, value): &(String, String)| format!("--filter {}", shell::word(&format!("{key}={value}")));
-        words.extend(request.filters.iter().map(filter));
-        words.extend(request.skip_validation.then(|| "--skip-bids-validation".to_owned()));
-        words.extend(request.config.iter().map(|config| format!("--config {}", word(path(config)))));
-        words.extend(crate::cohort::settings_words(&request.overrides, path));
-        words.join(" ")
-    };
-    (command(&|path: &Path| path.to_string_lossy().into_owned()), command(&shell::shown))
+/// The command that does a participant, or its session, alone.
+fn words(request: &BidsRequest, visit: &Visit, path: &dyn Fn(&Path) -> String) -> Vec<String> {
+    let word = |file: &Path| Retry::word(&path(file));
+    let mut words = vec!["espalier bids".to_owned(), word(&request.input), word(&request.out)];
+    words.push(format!("participant --participant-label {}", visit.participant));
+    words.extend(visit.session.iter().map(|session| format!("--session-label {session}")));
+    words.extend(request.suffix.iter().map(|suffix| format!("--suffix {}", Retry::word(suffix))));
+    let filter =
+        |(key, value): &(String, String)| format!("--filter {}", Retry::word(&format!("{key}={value}")));
+    words.extend(request.filters.iter().map(filter));
+    words.extend(request.skip_validation.then(|| "--skip-bids-validation".to_owned()));
+    words.extend(request.config.iter().map(|config| format!("--config {}", word(config))));
+    words.extend(Retry::settings(&request.overrides, path));
+    words.extend(Retry::options(&request.options, path));
+    words
 }

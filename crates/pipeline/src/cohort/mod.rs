@@ -3,15 +3,21 @@
 //! | step | file | what |
 //! |--:|---|---|
 //! | 1 | `table` | the table of the scans |
-//! | 2 | this file | each row with its config: what is wrong is told before anything is done |
-//! | 3 | `sample` | one scan: doing it, and whether it is done |
-//! | 4 | `page` | the page over all, and the list of those that failed |
+//! | 2 | `configure` | a row with its config |
+//! | 3 | this file | what is wrong with any of them is told before anything is done; then one after the other |
+//! | 4 | `sample`, `done` | one scan: doing it, and whether it is done |
+//! | 5 | `page`, `retry` | the page over all, and the list of those that failed, with the command that does each alone |
 //!
 //! **Input** a table, as `samples.tsv`: a row a scan. **Output** `runs/ID/`, a run folder a scan; `group/`, the page;
 //! `failures.tsv`, which scans have no map, why, and the command that tries each again.
-//! **Guarantees** a scan that fails stops no other. A scan that is done is looked at, not done again.
+//! **Guarantees** a scan that fails stops no other. A scan that is done is looked at, not done again. Of two calls at once
+//! that do all scans one goes on and the other stops or waits; calls for single scans may run beside each other. A call for
+//! some scans reads their configs and no others.
 
+mod configure;
+mod done;
 mod page;
+mod retry;
 mod sample;
 mod table;
 
@@ -20,15 +26,18 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
-use crate::config::{DATA_VARIABLE, Loaded, Override};
+use espalier_model::Diagnose;
+
+use crate::config::Override;
 use crate::error::Error;
 use crate::event::Event;
-use crate::run::{self, Summary};
-use crate::shell;
-use crate::side_file::SideFile;
-use table::{Row, quoted};
+use crate::lock::{Lock, Patience};
+use crate::run::Summary;
 
+pub(crate) use configure::written;
 pub use page::{CohortPage, FailedSample, PageRequest};
+pub(crate) use retry::Retry;
+pub use retry::Word;
 pub use sample::{Effort, Sample};
 
 /// The longest table that is read, in bytes.
@@ -45,8 +54,12 @@ pub struct CohortRequest {
     pub out: PathBuf,
     /// The config of the rows that name none.
     pub config: Option<PathBuf>,
+    /// The ids of the scans that are meant; all if none is named.
+    pub only: Vec<String>,
     /// What the command line changes, for all scans; it has the last word.
     pub overrides: Vec<Override>,
+    /// Other options of the command line, as the commands repeat them that do a scan alone.
+    pub options: Vec<Word>,
     /// What `$ESPALIER_DATA` stands for.
     pub data_dir: Option<PathBuf>,
 }
@@ -71,7 +84,12 @@ pub struct Cohort {
     pub absent: Vec<Absent>,
     /// Where page and list go.
     pub(crate) out: PathBuf,
+    /// Whether these are all the scans of the folder.
+    pub(crate) is_whole: bool,
 }
+
+/// The right to do all the scans of a cohort; given back when it is dropped.
+pub struct Hold(#[allow(dead_code, reason = "held, not used")] Option<Lock>);
 
 /// A scan that is not there.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -86,40 +104,43 @@ pub struct Absent {
 
 impl Cohort {
     /// A cohort without a scan.
-    pub(crate) fn new(out: PathBuf) -> Self {
-        Self { samples: Vec::new(), absent: Vec::new(), out }
+    pub(crate) fn new(out: PathBuf, is_whole: bool) -> Self {
+        Self { samples: Vec::new(), absent: Vec::new(), out, is_whole }
     }
 
-    /// Reads the table and the configs; nothing is done yet.
+    /// Reads the table, and the configs of the scans that are meant; nothing is done yet.
     ///
     /// # Errors
-    /// [`Error::Samples`] with all that is wrong, line by line; [`Error::Read`] if there is no such table.
+    /// [`Error::Samples`] with all that is wrong, line by line; [`Error::NoSample`] for an id that no row has;
+    /// [`Error::Read`] if there is no such table.
     pub fn read(request: &CohortRequest) -> Result<Self, Error> {
         let text = table_text(&request.table)?;
         let refused = |problems| Error::Samples { path: request.table.clone(), problems };
-        let rows = table::rows(&text).map_err(refused)?;
-        let (mut cohort, mut problems) = (Self::new(request.out.clone()), Vec::new());
+        let mut rows = table::rows(&text).map_err(refused)?;
+        if let Some(id) = request.only.iter().find(|id| !rows.iter().any(|row| row.id == **id)) {
+            return Err(Error::NoSample { id: id.clone() });
+        }
+        let is_whole = request.only.is_empty();
+        rows.retain(|row| is_whole || request.only.contains(&row.id));
+        let (mut cohort, mut problems) = (Self::new(request.out.clone(), is_whole), Vec::new());
         for row in &rows {
-            match sample(request, row) {
+            match configure::sample(request, row) {
                 Ok(sample) => cohort.samples.push(sample),
-                Err(error) => problems.push(format!("line {}: {}: {error}", row.line, row.id)),
+                Err(error) => problems.push(format!("line {}: {}: {}", row.line, row.id, with_hint(&error))),
             }
         }
         if problems.is_empty() { Ok(cohort) } else { Err(refused(problems)) }
     }
 
-    /// Those of the scans that have these ids, in the order of the table.
+    /// Takes the folder of the results until the value that it gives is dropped: two calls that do all the scans would stop
+    /// each other at every scan. Calls for some of the scans need no such right.
     ///
     /// # Errors
-    /// [`Error::NoSample`] for an id that none has.
-    pub fn only(mut self, ids: &[String]) -> Result<Self, Error> {
-        for id in ids {
-            if !self.samples.iter().any(|sample| sample.id == *id) {
-                return Err(Error::NoSample { id: id.clone() });
-            }
-        }
-        self.samples.retain(|sample| ids.contains(&sample.id));
-        Ok(self)
+    /// [`Error::Locked`] if another call has it, unless that is waited for; [`Error::Create`] if the folder cannot be made.
+    pub fn hold(&self, wait: bool, events: &(dyn Fn(Event) + Sync)) -> Result<Hold, Error> {
+        let say_so = || events(Event::Waiting { out: self.out.clone() });
+        let patience = if wait { Patience::Wait(&say_so) } else { Patience::None };
+        self.is_whole.then(|| Lock::take(&self.out, patience)).transpose().map(Hold)
     }
 
     /// Does the scans one after the other; one that fails stops no other. Before and after each, `said` is told.
@@ -157,19 +178,27 @@ impl Cohort {
     }
 
     /// The scans as JSON, for programs that do them: of each its folder, the file that is there once it is done, the files
-    /// that it is made from, and one digest over its settings.
+    /// that it is made from, one digest over its settings, whether it is done, and whether it was but its results are other
+    /// ones now.
     #[must_use]
     pub fn list(&self, effort: &Effort) -> String {
         let sample = |sample: &Sample| {
             json!({
                 "id": sample.id, "folder": sample.out, "done_file": sample.done_file(),
                 "files": sample.files(effort), "settings": sample.settings(), "done": sample.is_done(),
+                "altered": sample.is_altered(),
             })
         };
         let samples: Vec<_> = self.samples.iter().map(sample).collect();
         let list = json!({ "format": LIST_FORMAT, "version": LIST_VERSION, "samples": samples });
         serde_json::to_string_pretty(&list).unwrap_or_default() + "\n"
     }
+}
+
+/// An error with its way out, on a line of its own.
+fn with_hint(error: &Error) -> String {
+    let hint = Some(error.hint()).filter(|hint| !hint.is_empty());
+    format!("{error}{}", hint.map(|hint| format!("\n    hint: {hint}")).unwrap_or_default())
 }
 
 fn table_text(path: &Path) -> Result<String, Error> {
@@ -182,68 +211,4 @@ fn table_text(path: &Path) -> Result<String, Error> {
     let no_text =
         |_| Error::Samples { path: path.to_owned(), problems: vec!["it is not UTF-8 text".to_owned()] };
     String::from_utf8(bytes).map_err(no_text)
-}
-
-/// A row with its config.
-fn sample(request: &CohortRequest, row: &Row) -> Result<Sample, Error> {
-    let base_dir = request.table.parent().unwrap_or(Path::new(""));
-    let in_table = row.config.as_ref().map(|config| base_dir.join(config));
-    let config_file = in_table.or_else(|| request.config.clone());
-    let from_here = |set: &Override| Override { value: from_folder(base_dir, set), ..set.clone() };
-    let mut overrides: Vec<Override> = row.settings.iter().map(from_here).collect();
-    overrides.extend(request.overrides.iter().cloned());
-    let written = row.settings.iter().find(|set| set.key == "input.path").map(|set| set.value.clone());
-    let loaded = match (&config_file, &written) {
-        (Some(config), _) => Loaded::read_config(config, &overrides)?,
-        (None, path) => Loaded::read(Path::new(&text_of(path.as_deref().unwrap_or_default())), &overrides)?,
-    };
-    run::source_of(&loaded, request.data_dir.as_deref())?;
-    let (retry, retry_shown) = retries(request, &row.id);
-    let out = request.out.join("runs").join(&row.id);
-    let written = written.or_else(|| loaded.config.input.path.clone()).unwrap_or_default();
-    Ok(Sample { id: row.id.clone(), out, loaded, config_file, written, retry, retry_shown })
-}
-
-/// The value of a setting; a path in the table is relative to the table's folder, whatever config it goes into.
-fn from_folder(base_dir: &Path, set: &Override) -> String {
-    let text = text_of(&set.value);
-    if !is_path(set) || text.is_empty() || text.starts_with(DATA_VARIABLE) {
-        return set.value.clone();
-    }
-    let path = base_dir.join(text);
-    quoted(&std::path::absolute(&path).unwrap_or(path).to_string_lossy())
-}
-
-fn is_path(set: &Override) -> bool {
-    set.key == "input.path" || SideFile::ALL.iter().any(|side| side.key() == set.key)
-}
-
-/// The text in a TOML string; of what is none, as it is.
-fn text_of(value: &str) -> String {
-    let table = toml::from_str::<toml::Table>(&format!("value = {value}")).ok();
-    let text = table.as_ref().and_then(|table| table.get("value")?.as_str());
-    text.unwrap_or(value).to_owned()
-}
-
-/// The commands that do a scan alone: as it would be typed, and as a page may show it.
-fn retries(request: &CohortRequest, id: &str) -> (String, String) {
-    let command = |path: &dyn Fn(&Path) -> String| {
-        let mut words = vec!["espalier cohort".to_owned(), shell::word(&path(&request.table))];
-        words.push(format!("-o {}", shell::word(&path(&request.out))));
-        words.extend(request.config.iter().map(|config| format!("--config {}", shell::word(&path(config)))));
-        words.extend(settings_words(&request.overrides, path));
-        words.push(format!("--only {id}"));
-        words.join(" ")
-    };
-    let as_typed = |path: &Path| path.to_string_lossy().into_owned();
-    (command(&as_typed), command(&shell::shown))
-}
-
-/// Settings of the command line as words of a shell; paths among them as they are to be shown.
-pub(crate) fn settings_words(overrides: &[Override], path: &dyn Fn(&Path) -> String) -> Vec<String> {
-    let value = |set: &Override| {
-        if is_path(set) { path(Path::new(&text_of(&set.value))) } else { set.value.clone() }
-    };
-    let words = |set: &Override| format!("--set {}", shell::word(&format!("{}={}", set.key, value(set))));
-    overrides.iter().map(words).collect()
 }

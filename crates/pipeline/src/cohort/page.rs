@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use espalier_model::table::{Column, Table};
 use espalier_report::group::{Failed, GroupOutcome, GroupRun};
 
+use super::done::Standing;
 use super::{Absent, Cohort, Sample};
 use crate::error::Error;
 use crate::folder::write_file;
@@ -34,6 +35,8 @@ pub struct PageRequest {
     pub is_anonymous: bool,
     /// Threads; `None` for one per core.
     pub threads: Option<usize>,
+    /// Whether to wait for another call that makes the page, rather than to stop.
+    pub wait: bool,
 }
 
 /// What a cohort has come to.
@@ -43,6 +46,8 @@ pub struct CohortPage {
     pub table: String,
     /// The scans without a map, in the order of the table.
     pub failed: Vec<FailedSample>,
+    /// How many scans were done with other settings than the page was asked for with.
+    pub n_other_settings: usize,
     /// Where they are listed.
     pub failures_file: PathBuf,
     /// The folder of the page and its digest.
@@ -75,7 +80,7 @@ impl Cohort {
             label: numbered.as_ref().map_or(&sample.id, |labels| &labels[idx]).clone(),
             folder: sample.out.clone(),
             failed: sample.trouble(),
-            retry: Some(sample.retry_shown.clone()).filter(|_| !request.is_anonymous),
+            retry: Some(sample.retry.shown.clone()).filter(|_| !request.is_anonymous),
         };
         let mut members: Vec<Member> = self.samples.iter().enumerate().map(member).collect();
         members.extend(self.absent.iter().enumerate().map(|(idx, absent)| {
@@ -90,6 +95,7 @@ impl Cohort {
                 out: &self.out.join("group"),
                 title: title.unwrap_or("Cohort"),
                 threads: request.threads,
+                wait: request.wait,
             },
         )?;
         let mut failed: Vec<FailedSample> = self.samples.iter().zip(&shown.runs).filter_map(failed).collect();
@@ -102,7 +108,9 @@ impl Cohort {
         }));
         let failures_file = self.out.join(FAILURES_FILE);
         write_file(&failures_file, tsv(&failed).as_bytes())?;
-        Ok(CohortPage { table: shown.table, failed, failures_file, summary: shown.summary })
+        let is_other = |sample: &&Sample| sample.standing() == Standing::OtherSettings;
+        let n_other_settings = self.samples.iter().filter(is_other).count();
+        Ok(CohortPage { table: shown.table, failed, n_other_settings, failures_file, summary: shown.summary })
     }
 }
 
@@ -117,7 +125,7 @@ fn failed((sample, run): (&Sample, &GroupRun)) -> Option<FailedSample> {
         code: failed.code.clone(),
         reason: failed.reason.clone(),
         done_to: failed.done_to.clone(),
-        retry: Some(sample.retry.clone()),
+        retry: Some(sample.retry.typed.clone()),
     })
 }
 

@@ -1,33 +1,28 @@
-//! One scan of a cohort: doing it, and whether it is done.
+//! One scan of a cohort: doing it.
 //!
-//! **Input** a config with its paths, and a run folder. **Output** the run, and beside its results
-//! `provenance/sample.json`: what it was made with, written when it is done.
+//! **Input** a config with its paths, and a run folder. **Output** the run, and beside its results the note that it is done.
 //! **Steps** 1. The note of an earlier run goes. 2. The run. 3. A new note, or why there is none.
-//! **Guarantees** a scan counts as done only if its last run came to its end and had these settings and this path. A run
-//! that is killed leaves no such note; one that fails leaves `provenance/failure.json`, also where it made nothing else.
+//! **Guarantees** a run that is killed leaves no note; one that fails leaves `provenance/failure.json`, also where it made
+//! nothing else.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use espalier_report::group::Failed;
-use serde::{Deserialize, Serialize};
 
+use super::Retry;
+use super::done::Standing;
 use crate::cache::Cache;
-use crate::config::{Config, Loaded, Source};
+use crate::config::{Loaded, Source};
 use crate::error::Error;
 use crate::event::Event;
 use crate::failure;
-use crate::folder::{RunFolder, hex_digest};
+use crate::folder::RunFolder;
 use crate::group;
 use crate::run::{self, Request, Summary};
-use crate::settings;
 use crate::side_file::SideFile;
-use crate::stage::{Artifact, Stage};
+use crate::stage::Artifact;
 
-/// Where it is noted that a scan is done.
-const DONE_FILE: &str = "provenance/sample.json";
-const FORMAT: &str = "espalier-sample";
-const VERSION: u32 = 1;
 /// Volumes whose voxels lie in a file of their own.
 const WITH_DATA_BESIDE: [&str; 4] = ["nhdr", "mhd", "hdr", "img"];
 
@@ -41,12 +36,10 @@ pub struct Sample {
     pub(crate) loaded: Loaded,
     /// The config file that was read for it.
     pub(crate) config_file: Option<PathBuf>,
-    /// Its path as it was written.
-    pub(crate) written: String,
-    /// The command that does it alone, as it would be typed.
-    pub(crate) retry: String,
-    /// The same as a page may show it.
-    pub(crate) retry_shown: String,
+    /// The paths of its files as they were written, by key.
+    pub(crate) written: BTreeMap<&'static str, String>,
+    /// The command that does it alone.
+    pub(crate) retry: Retry,
 }
 
 /// How scans are done.
@@ -66,46 +59,24 @@ pub struct Effort {
     pub cache: Option<Cache>,
 }
 
-/// That a scan is done.
-#[derive(Serialize, Deserialize)]
-struct Done {
-    format: String,
-    version: u32,
-    /// What it was made with.
-    settings: String,
-    /// The digest that the run printed.
-    digest: String,
-}
-
 impl Sample {
     /// Does the scan.
     ///
     /// # Errors
     /// [`Error`], as [`run()`](fn@crate::run).
     pub fn perform(&self, effort: &Effort, events: &(dyn Fn(Event) + Sync)) -> Result<Summary, Error> {
-        let folder = RunFolder::to_read(&self.out);
         let done_file = self.done_file();
         // A folder that is there keeps the note of a failure; that of another's making would take it away.
         let provenance = done_file.parent().unwrap_or(&self.out);
         std::fs::create_dir_all(provenance)
             .map_err(|source| Error::Create { path: provenance.to_owned(), source })?;
-        let earlier = std::fs::read(&done_file).ok();
-        match std::fs::remove_file(&done_file) {
-            Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
-                return Err(Error::Write { path: done_file, source });
-            }
-            _ => {}
-        }
+        let earlier = self.undo()?;
         let done = run::run(&self.request(effort), events);
         match &done {
-            Ok(summary) => folder.write_aside(DONE_FILE, self.done(&summary.digest).as_bytes())?,
+            Ok(summary) => self.note_done(&summary.digest)?,
             // Nothing was done, and whoever holds the folder will say how that went.
-            Err(Error::Locked { .. }) => {
-                if let Some(earlier) = earlier.filter(|_| !done_file.exists()) {
-                    folder.write_aside(DONE_FILE, &earlier)?;
-                }
-            }
-            Err(error) => failure::note(&folder, error),
+            Err(Error::Locked { .. }) => self.redo(earlier)?,
+            Err(error) => failure::note(&RunFolder::to_read(&self.out), error),
         }
         done
     }
@@ -124,46 +95,6 @@ impl Sample {
             data_dir: effort.data_dir.clone(),
             cache: effort.cache.clone(),
         }
-    }
-
-    /// The file that is there once the scan is done.
-    #[must_use]
-    pub fn done_file(&self) -> PathBuf {
-        self.out.join(DONE_FILE)
-    }
-
-    fn done(&self, digest: &str) -> String {
-        let done = Done {
-            format: FORMAT.to_owned(),
-            version: VERSION,
-            settings: self.settings(),
-            digest: digest.to_owned(),
-        };
-        serde_json::to_string_pretty(&done).unwrap_or_default() + "\n"
-    }
-
-    /// One digest over all that decides what its results are, but for what its files hold.
-    #[must_use]
-    pub fn settings(&self) -> String {
-        let versions = Stage::ALL.map(|stage| format!("{stage} {}\n", stage.version())).concat();
-        let Loaded { config, .. } = &self.loaded;
-        let version = env!("CARGO_PKG_VERSION");
-        let (written, settings, beside) = (&self.written, settings::portable_text(config), beside(config));
-        hex_digest(format!("{version}\n{versions}{written}\n{beside}{settings}").as_bytes())
-    }
-
-    /// Whether it is done, with these settings and this path, and nobody has made other results there since.
-    #[must_use]
-    pub fn is_done(&self) -> bool {
-        let text = std::fs::read_to_string(self.done_file()).unwrap_or_default();
-        let sums = std::fs::read(self.out.join("SHA256SUMS")).ok();
-        let digest = sums.map(|sums| hex_digest(&sums));
-        serde_json::from_str::<Done>(&text).is_ok_and(|done| {
-            done.format == FORMAT
-                && done.version == VERSION
-                && done.settings == self.settings()
-                && Some(done.digest) == digest
-        })
     }
 
     /// The files that its results are made from, as far as they are there.
@@ -191,7 +122,8 @@ impl Sample {
 
     /// Why it is not done; none if it is.
     pub(crate) fn trouble(&self) -> Option<Failed> {
-        if self.is_done() {
+        let standing = self.standing();
+        if standing == Standing::Done {
             return None;
         }
         let is_noted = failure::read(&self.out).is_some();
@@ -201,14 +133,22 @@ impl Sample {
         }
         Some(Failed {
             code: "E-GROUP-UNFINISHED".to_owned(),
-            reason: "done before, but not with these settings and this path, or not to its end".to_owned(),
+            reason: match standing {
+                Standing::OtherSettings => {
+                    "done before, but not with these settings and paths: the page takes the options that the scan was done \
+                     with"
+                    .to_owned()
+                }
+                Standing::Altered { file } => {
+                    format!("done before, but {file} is gone since, or not as long as it was")
+                }
+                Standing::Done | Standing::Undone => {
+                    "done before, but its last run has not come to its end, or others have made results there since"
+                        .to_owned()
+                }
+            },
             done_to: None,
             retry: None,
         })
     }
-}
-
-/// The names of the files beside the input, as the config has them.
-fn beside(config: &Config) -> String {
-    SideFile::ALL.into_iter().filter_map(|side| Some(format!("{}\n", side.path_in(config)?))).collect()
 }

@@ -22,6 +22,7 @@ use rayon::prelude::*;
 
 use crate::error::Error;
 use crate::folder::RunFolder;
+use crate::lock::Patience;
 use crate::run::{Summary, in_pool};
 use crate::settings;
 
@@ -81,6 +82,8 @@ pub(crate) struct GroupPage<'a> {
     pub(crate) out: &'a Path,
     pub(crate) title: &'a str,
     pub(crate) threads: Option<usize>,
+    /// Whether to wait for another call that makes the page.
+    pub(crate) wait: bool,
 }
 
 /// A page that was made.
@@ -111,13 +114,15 @@ pub fn group(request: &GroupRequest) -> Result<Grouped, Error> {
     let members: Vec<Member> = found.into_iter().zip(labels).map(member).collect();
     let title = request.title.as_deref().filter(|title| !title.trim().is_empty());
     let title = title.unwrap_or("Group of runs");
-    let shown = show(&members, &GroupPage { out: &request.out, title, threads: request.threads })?;
+    let page = GroupPage { out: &request.out, title, threads: request.threads, wait: false };
+    let shown = show(&members, &page)?;
     Ok(Grouped { table: shown.table, notes, summary: shown.summary })
 }
 
 /// Makes the page over these runs.
 pub(crate) fn show(members: &[Member], page: &GroupPage<'_>) -> Result<Shown, Error> {
     refuse_run_folder(page.out)?;
+    check_size(members.len())?;
     let side_px = SIDES_PX.iter().find(|(most, _)| members.len() <= *most).map_or(96, |(_, side)| *side);
     let runs: Vec<GroupRun> =
         in_pool(page.threads, || Ok(members.par_iter().map(|member| shown_run(member, side_px)).collect()))?;
@@ -128,7 +133,9 @@ pub(crate) fn show(members: &[Member], page: &GroupPage<'_>) -> Result<Shown, Er
         ("group.json", made.json),
         ("dictionary.tsv", made.dictionary),
     ];
-    let mut folder = RunFolder::open(page.out)?;
+    // A page is a matter of seconds: nobody need be told that this one waits.
+    let patience = if page.wait { Patience::Wait(&|| {}) } else { Patience::None };
+    let mut folder = RunFolder::open_or_wait(page.out, patience)?;
     for (file, text) in &files {
         folder.write(file, text.as_bytes())?;
     }
@@ -157,6 +164,11 @@ fn refuse_run_folder(out: &Path) -> Result<(), Error> {
     if is_in_the_way { Err(Error::RunInTheWay { folder: out.to_owned() }) } else { Ok(()) }
 }
 
+/// A page must open.
+fn check_size(n_runs: usize) -> Result<(), Error> {
+    if n_runs > MOST_RUNS { Err(Error::GroupSize { n_runs, limit: MOST_RUNS }) } else { Ok(()) }
+}
+
 /// Every run folder once, in the order in which they were given, those of one folder by name; and what is to be said.
 fn find(request: &GroupRequest) -> Result<(Vec<Found>, Vec<String>), Error> {
     let (mut found, mut notes, mut known) = (Vec::new(), Vec::new(), BTreeSet::new());
@@ -170,9 +182,7 @@ fn find(request: &GroupRequest) -> Result<(Vec<Found>, Vec<String>), Error> {
             }
         }
     }
-    if found.len() > MOST_RUNS {
-        return Err(Error::GroupSize { n_runs: found.len(), limit: MOST_RUNS });
-    }
+    check_size(found.len())?;
     if !found.iter().any(|found| found.is_run) {
         return Err(Error::NoGroup { folders: request.folders.clone() });
     }
