@@ -1,4 +1,5 @@
-//! The choices among the parameters: methods, freedoms, starts, pulls, poses, and the price of a crossing.
+//! The choices among the parameters: targets, methods, views, freedoms, starts, pulls, poses, what is done about widths
+//! and behind the root, and the price of a crossing.
 //!
 //! Written in the config as words in kebab-case; the price of a crossing is the word `auto` or a number.
 

@@ -18,7 +18,7 @@ use espalier_geom::math;
 use glam::DVec2;
 
 use crate::problem::Problem;
-use crate::runs::{Box2, Lanes, MIXED, RUN, is_same_fan};
+use crate::runs::{Lanes, MIXED, RUN, UprightBox, is_same_fan};
 
 /// The tolerance as a share of the median edge length, and the least angle between siblings in rad.
 pub(crate) const TOLERANCE: f64 = 1e-6;
@@ -36,7 +36,7 @@ pub(crate) struct Scratch {
 
 #[derive(Clone, Copy)]
 struct RunBox {
-    bounds: Box2,
+    bounds: UprightBox,
     run: u32,
     /// The node from which all edges of the run come, or `MIXED`.
     hub: u32,
@@ -98,12 +98,12 @@ impl Check<'_> {
         scratch.lanes.resize(n_runs, Lanes::EMPTY);
         scratch.runs.clear();
         for (run, lanes) in scratch.lanes.iter_mut().enumerate() {
-            let mut all = Box2::EMPTY;
+            let mut all = UprightBox::EMPTY;
             for lane in 0..RUN.min(n_edges - run * RUN) {
                 let node = run * RUN + lane + 1;
                 let parent = self.problem.parent[node] as usize;
                 let of = |node: usize| (self.x[node] * per_mm, self.y[node] * per_mm);
-                let bounds = Box2::around(of(node), of(parent), 0.5 * TOLERANCE);
+                let bounds = UprightBox::around(of(node), of(parent), 0.5 * TOLERANCE);
                 lanes.set(lane, bounds);
                 all = all.joined(&bounds);
             }

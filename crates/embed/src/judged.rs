@@ -67,9 +67,19 @@ pub(crate) fn judge(
 }
 
 impl Judged {
-    /// Whether no length and no angle is lost: nothing can be better for these targets.
+    /// Whether no length and no angle is lost, whatever it weighs: nothing can be better for these targets.
     pub(crate) fn is_optimal(&self) -> bool {
-        self.scored.energy.length + self.scored.energy.angle == 0.0
+        let Scored { length_ratio, angle_ratio, .. } = &self.scored;
+        length_ratio.iter().chain(angle_ratio).all(|&ratio| ratio == 0.0)
+    }
+
+    /// Why the method ended: optimal only where nothing is lost as written.
+    pub(crate) fn ended(&self) -> Termination {
+        match self.termination {
+            _ if self.is_optimal() => Termination::Optimal,
+            Termination::Optimal => Termination::Converged,
+            other => other,
+        }
     }
 
     /// Its row and its coordinates in the comparison.

@@ -4,17 +4,19 @@
 //! |--:|---|---|
 //! | 1 | `targets`, `siblings` | target angles, lengths and headings from the tree and its views |
 //! | 2 | `problem`, `weights`, `ratio`, `prospect` | the frozen problem; the user's weights; equation 3 between angles and ratios; whether a search is worth it |
-//! | 3 | `layout/…` | the methods: `projection`, `radial`, `cone`, `marino`, `pso` (with `start`) |
-//! | 4 | `batch`, `trig`, `crossing`, `runs` | the swarm's energy, many particles at once, and its strict crossing count |
-//! | 5 | `pose` | one rigid motion of the whole, mirrored or not; rounding to what is written |
-//! | 6 | `certify`, `widths/…`, `boxes` | the exact certificate; layouts at the widths of their tubes; boxes that meet |
-//! | 7 | `energy`, `losses/…`, `distances`, `judged` | the one energy and all losses, for every method alike |
-//! | 8 | `methods`, `select`, `summary`, `never_worse` | the methods' run; the best certified layout and the table of all; what is said of them; the last look |
-//! | 9 | `replay`, `pins` | manual edits in it: branches turned and pinned, the rest laid around them |
+//! | 3 | `layout/…`, `place` | the methods: `projection`, `radial`, `cone`, `marino`, `pso` (with `start`); positions from headings |
+//! | 4 | `solver/…`, `separation`, `paths` | the default method: the search for sides, then ratios; how near edges may come |
+//! | 5 | `batch`, `trig`, `crossing`, `runs` | the swarm's energy, many particles at once, and its strict crossing count |
+//! | 6 | `pose` | one rigid motion of the whole, mirrored or not; rounding to what is written |
+//! | 7 | `certify`, `widths/…`, `boxes` | the exact certificate; layouts at the widths of their tubes; boxes that meet |
+//! | 8 | `energy`, `losses/…`, `distances`, `judged` | the one energy and all losses, for every method alike |
+//! | 9 | `methods`, `select`, `summary`, `never_worse` | the methods' run; the best certified layout and the table of all; what is said of them; the last look |
+//! | 10 | `replay`, `pins` | manual edits in it: branches turned and pinned, the rest laid around them |
 //!
 //! **Cost** Targets, radial, cone, pose and energy are linear in N. The certificate sorts and sweeps, N log N on
 //! layouts that fill their box. Distances take a fixed 1.1 million pairs. The swarm takes particles · iterations
-//! evaluations, of which most end at the first lines of `batch`; the crossing check is the rest.
+//! evaluations, of which most end at the first lines of `batch`; the crossing check is the rest. The solver counts its
+//! work and ends within a multiple of N (see `solver`); it takes most of the time from about a thousand nodes on.
 //!
 //! **Source** [Hu2022] sections 3.2 and 5.1.
 
@@ -186,6 +188,9 @@ pub fn embed_edited(
     let problems = methods::Problems {
         frozen: mirrored.as_ref().unwrap_or(&problem),
         unflipped: mirrored.is_some().then_some(&problem),
+        search_evaluations: mirrors_report
+            .get("mirror_evaluations")
+            .map_or(0, |evaluations| evaluations as u64),
     };
     let layouts = methods::run(problems, views, params, seed, events)?;
     let mut embedded = select::select(problems, layouts, edits, (params, seed))?;

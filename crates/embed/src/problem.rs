@@ -19,6 +19,9 @@ use crate::params::Params;
 use crate::ratio;
 use crate::weights::Weights;
 
+/// Up to this weight w_g decides between layouts of like angles and no more: one that meets all targets is final.
+const TIE_BREAK: f64 = 0.01;
+
 /// A tree with targets and weights.
 #[derive(Clone)]
 pub(crate) struct Problem<'a> {
@@ -58,6 +61,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) crossing_weight: f64,
     /// w_s.
     pub(crate) w_side: f64,
+    /// Whether exact lengths and angles may give way to headings: w_g is more than a tie-break.
+    pub(crate) trades_placement: bool,
     /// The typical edge length, in mm: the scale of the swarm's tolerance.
     pub(crate) scale_mm: f64,
     /// Whether nothing that was tried brings the tree near its targets (see `prospect`).
@@ -129,6 +134,7 @@ impl<'a> Problem<'a> {
             placement_sin,
             crossing_weight,
             w_side: params.w_side,
+            trades_placement: params.w_placement > TIE_BREAK,
             scale_mm,
             is_crowded: false,
         }

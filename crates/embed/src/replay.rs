@@ -7,7 +7,8 @@
 //! **Steps** for each edit, on the layout that the edits before it have left: 1. Turn the joint. 2. Pin the turns of B
 //! from the joint on, and its length. 3. Crossings that this brings about are removed, and all that is not pinned is
 //! optimised from there (`solver::repair`).
-//! An edit that cannot be freed of crossings at once may be by a later one; only the end decides.
+//! An edit that cannot be freed of crossings at once may be by a later one; only the end decides. 4. After the last,
+//! where widths are to be avoided, what is not pinned gives way to the widths of the tubes again.
 //! **Guarantees** pinned turns are as asked, also on the other side of their targets, and pinned branches keep their
 //! length. The edits at the beginning of a list do what they would do without the rest of it. An edit that needs no
 //! repair leaves every loss of other branches as it is or lowers it.
@@ -28,7 +29,7 @@ use crate::params::Params;
 use crate::pins::{self, Drawn, Pins};
 use crate::pose::Posed;
 use crate::problem::Problem;
-use crate::solver;
+use crate::{solver, widths};
 
 /// A pinned branch keeps at least this from the edge that it comes from: a fold within the rounding of coordinates
 /// would be certified or not by chance, and nobody could see it.
@@ -36,7 +37,7 @@ const LEAST_GAP_DEG: f64 = 0.01;
 
 /// The layout to be edited.
 pub(crate) struct Base<'a> {
-    /// Before pose and rounding.
+    /// Before pose and rounding, and before lengths were scaled against radii.
     pub(crate) positions: &'a [DVec2],
     /// Whether the picture shows its mirror image: counter-clockwise there is clockwise here.
     pub(crate) is_reflected: bool,
@@ -101,6 +102,7 @@ pub(crate) fn replay(
     if !state.certificate.holds() {
         return Err(conflict(problem, edits, &state.certificate));
     }
+    state.give_way_to_widths(params);
     for (edit_idx, edit) in edits.iter().enumerate() {
         state.check_fold(edit_idx, edit)?;
     }
@@ -171,6 +173,13 @@ impl<'a> State<'a> {
     fn shape(&self) -> (solver::Shape, Problem<'a>) {
         let (pinned, shape) = pins::around(self.problem, &self.drawn, &self.pins);
         (shape, pinned)
+    }
+
+    fn give_way_to_widths(&mut self, params: &Params) {
+        let (shape, pinned) = self.shape();
+        if let Some(shape) = widths::avoided(&pinned, params, &shape) {
+            self.adopt(&pinned, &shape);
+        }
     }
 
     fn adopt(&mut self, pinned: &Problem, shape: &solver::Shape) {

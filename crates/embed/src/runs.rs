@@ -15,14 +15,14 @@ pub(crate) const MIXED: u32 = u32::MAX;
 
 /// A box.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Box2 {
+pub(crate) struct UprightBox {
     pub(crate) x_low: f32,
     pub(crate) x_high: f32,
     pub(crate) y_low: f32,
     pub(crate) y_high: f32,
 }
 
-impl Box2 {
+impl UprightBox {
     /// Without a point: it meets nothing.
     pub(crate) const EMPTY: Self = Self {
         x_low: f32::INFINITY,
@@ -86,7 +86,7 @@ impl Lanes {
     };
 
     #[inline]
-    pub(crate) fn set(&mut self, lane: usize, bounds: Box2) {
+    pub(crate) fn set(&mut self, lane: usize, bounds: UprightBox) {
         self.x_low[lane] = bounds.x_low;
         self.x_high[lane] = bounds.x_high;
         self.y_low[lane] = bounds.y_low;
@@ -94,8 +94,8 @@ impl Lanes {
     }
 
     #[inline]
-    pub(crate) fn get(&self, lane: usize) -> Box2 {
-        Box2 {
+    pub(crate) fn get(&self, lane: usize) -> UprightBox {
+        UprightBox {
             x_low: self.x_low[lane],
             x_high: self.x_high[lane],
             y_low: self.y_low[lane],
@@ -106,7 +106,7 @@ impl Lanes {
     /// One bit for each lane whose box meets `bounds`.
     // Within a long loop the compiler forgets to use vectors.
     #[inline(never)]
-    pub(crate) fn meeting(&self, bounds: Box2) -> u32 {
+    pub(crate) fn meeting(&self, bounds: UprightBox) -> u32 {
         // No branches and a fixed length: this becomes a few vector comparisons.
         let is_met: [u32; RUN] = std::array::from_fn(|lane| {
             u32::from(self.x_low[lane] <= bounds.x_high)
@@ -138,7 +138,7 @@ mod tests {
             let far = [0.0, 1e3, 1e7, 1e300][round % 4];
             let mut point = || (far + stream.normal(), far - stream.normal());
             let (a, b, c, d) = (point(), point(), point(), point());
-            let (first, second) = (Box2::around(a, b, 0.1), Box2::around(c, d, 0.2));
+            let (first, second) = (UprightBox::around(a, b, 0.1), UprightBox::around(c, d, 0.2));
             let meets = |a: f64, b: f64, c: f64, d: f64| {
                 a.min(b) - 0.1 <= c.max(d) + 0.2 && c.min(d) - 0.2 <= a.max(b) + 0.1
             };

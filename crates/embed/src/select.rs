@@ -9,6 +9,7 @@
 //! **Guarantees** the result is certified, and under an optimiser never worse than any certified layout that ran.
 
 use espalier_model::{Certificate, ComparedLayout, Comparison, EditRecord, Edits, Embedding, Termination};
+use glam::DVec2;
 use rayon::prelude::*;
 
 use crate::choices::Method;
@@ -50,6 +51,7 @@ pub(crate) fn select(
         chosen = judged.len();
         judged.push(made.0);
     }
+    summary::warn_of_widths(problem, &judged[chosen].widths, &mut report);
     let layouts: Vec<ComparedLayout> = judged.iter().map(Judged::compared).collect();
     let methods = layouts.iter().map(|layout| layout.row.clone()).collect();
     let asked = judged.iter().find(|judged| judged.method == params.method);
@@ -58,7 +60,7 @@ pub(crate) fn select(
         Comparison { tree: problem.tree.digest(), targets: problem.targets.digest(), seed, chosen, layouts };
 
     let best = judged.swap_remove(chosen);
-    let termination = if best.is_optimal() { Termination::Optimal } else { best.termination };
+    let termination = best.ended();
     let Judged { name, posed, certificate, scored, losses, widths, .. } = best;
     let embedding = Embedding {
         tree: problem.tree.digest(),
@@ -90,25 +92,29 @@ fn edited(
     edits: &Edits,
     params: &Params,
 ) -> Result<(Judged, Vec<EditRecord>), Error> {
+    let scale = winner.widths.length_scale;
+    let unscaled: Vec<DVec2> = winner.drawn.iter().map(|&place| place / scale).collect();
     let base = replay::Base {
-        positions: &winner.drawn,
+        positions: &unscaled,
         is_reflected: winner.posed.pose.is_reflected,
         quantum_mm: winner.posed.quantum_mm,
         energy: winner.scored.energy.total(),
     };
     let mut replayed = replay::replay(problem, &base, edits.list(), params)?;
-    let posed = pose::posed_like(&replayed.positions, winner.posed.pose);
+    let length_scale = widths::stretch(problem, params, &replayed.positions);
+    let positions: Vec<DVec2> = replayed.positions.iter().map(|&place| place * length_scale).collect();
+    let posed = pose::posed_like(&positions, winner.posed.pose);
     let name = format!("{}, edited", winner.name);
     let layout = Layout {
         name,
-        positions: replayed.positions.clone(),
+        positions,
         evaluations: replayed.work,
         trace: Vec::new(),
         termination: replayed.termination,
         aim: Aim::Frozen,
     };
     let mut edited = judge((problem, space), winner.method, layout, posed);
-    (edited.widths.mode, edited.widths.length_scale) = (winner.widths.mode, winner.widths.length_scale);
+    (edited.widths.mode, edited.widths.length_scale) = (winner.widths.mode, length_scale);
     if !edited.certificate.holds() {
         return Err(replay::conflict(problem, edits.list(), &edited.certificate));
     }
@@ -204,9 +210,9 @@ mod tests {
         let unflipped = Problem::new(tree, branches.clone(), as_seen, params);
         let frozen = Problem::new(tree, branches, mirrored, params);
         let problems = if is_mirrored {
-            Problems { frozen: &frozen, unflipped: Some(&unflipped) }
+            Problems { frozen: &frozen, unflipped: Some(&unflipped), search_evaluations: 5 }
         } else {
-            Problems { frozen: &unflipped, unflipped: None }
+            Problems { frozen: &unflipped, unflipped: None, search_evaluations: 0 }
         };
         let layouts = methods::run(problems, &views, params, 0, &|_| {}).expect("layouts");
         select(problems, layouts, &Edits::none(tree), (params, 0)).expect("a certified layout")

@@ -28,28 +28,6 @@ pub(crate) fn of_layouts(problem: &Problem, judged: &[Judged], winner: &Judged, 
     if params.methods.contains(&Method::Pso) && methods::is_too_large_for_swarm(problem, params) {
         report.count("pso_left_out_above_nodes", params.pso.max_nodes);
     }
-    if !winner.widths.is_complete {
-        let message = format!(
-            "the mean radius is {} mm, the median edge {} mm: too many tubes overlap to count them all; check the \
-             unit of the radii",
-            problem.tree.mean_radius_mm(),
-            problem.scale_mm
-        );
-        report.warn("W-EMBED-THICK-TUBES", message);
-    }
-    if winner.widths.are_impossible() {
-        let Widths { area_needed_mm2, area_available_mm2, .. } = winner.widths;
-        let message = format!(
-            "the tubes need at least {area_needed_mm2:.0} mm², but with exact lengths there are only \
-             {area_available_mm2:.0} mm²: no layout keeps both lengths and widths without overlaps"
-        );
-        report.warn("W-EMBED-NO-ROOM", message);
-    }
-    if winner.widths.mode != WidthMode::Report && winner.widths.overlaps > 0 {
-        let Widths { overlaps, radius_scale, .. } = winner.widths;
-        let message = format!("{overlaps} overlaps are left; none at {radius_scale:.3} of the radii");
-        report.warn("W-EMBED-OVERLAPS", message);
-    }
     if winner.method != asked {
         let reason = match judged.iter().find(|judged| judged.method == asked) {
             Some(judged) if judged.certificate.holds() => {
@@ -65,11 +43,38 @@ pub(crate) fn of_layouts(problem: &Problem, judged: &[Judged], winner: &Judged, 
     report
 }
 
+/// What has to be said of the result at the widths of its tubes.
+pub(crate) fn warn_of_widths(problem: &Problem, widths: &Widths, report: &mut Report) {
+    if !widths.is_complete {
+        let message = format!(
+            "the mean radius is {} mm, the median edge {} mm: too many tubes overlap to count them all; check the \
+             unit of the radii",
+            problem.tree.mean_radius_mm(),
+            problem.scale_mm
+        );
+        report.warn("W-EMBED-THICK-TUBES", message);
+    }
+    if widths.are_impossible() {
+        let Widths { area_needed_mm2, area_available_mm2, .. } = *widths;
+        let message = format!(
+            "the tubes need at least {area_needed_mm2:.0} mm², but with exact lengths there are only \
+             {area_available_mm2:.0} mm²: no layout keeps both lengths and widths without overlaps"
+        );
+        report.warn("W-EMBED-NO-ROOM", message);
+    }
+    if widths.mode != WidthMode::Report && widths.overlaps > 0 {
+        let Widths { overlaps, radius_scale, .. } = *widths;
+        let message = format!("{overlaps} overlaps are left; none at {radius_scale:.3} of the radii");
+        report.warn("W-EMBED-OVERLAPS", message);
+    }
+}
+
 /// What is said of manual edits.
 pub(crate) fn of_edits((edited, records): &(Judged, Vec<EditRecord>)) -> Report {
     let mut report = Report::default();
     report.count_usize("edits", records.len());
     report.count_usize("edits_crossings_removed", records.iter().map(|r| r.crossings_removed).sum());
+    report.count_usize("overlaps_edited", edited.widths.overlaps);
     report.count("energy_edited", edited.scored.energy.total());
     report
 }

@@ -7,7 +7,7 @@ mod common;
 use common::{random_tree, tree_of, views_along};
 use espalier_embed::{Method, Params, PsoParams, SolverParams, WeightRule, embed};
 use espalier_model::diagnose::{Class, Diagnose};
-use espalier_model::{Embedding, Tree};
+use espalier_model::{Embedding, Termination, Tree};
 use glam::DVec3;
 
 /// The swarm alone, small.
@@ -179,4 +179,46 @@ fn a_rule_for_a_part_that_is_not_there() {
     let empty = with(&[WeightRule { depth_mm: Some([1e3, 1e4]), w_angle: Some(1.0), ..rule() }]);
     let report = embed(&tree, &views_along(&tree, DVec3::Z), &empty, 0, &|_| {}).expect("a layout").report;
     assert_eq!(report.warnings[0].code, "W-EMBED-NO-SUCH-PART");
+}
+
+#[test]
+fn headings_that_are_asked_for_take_something_of_exact_angles() {
+    let mut n_traded = 0;
+    for key in 0..16 {
+        let tree = random_tree(key as usize % 8, 60, 1.0, false, key);
+        let with_placement = |w_placement| {
+            let methods = vec![Method::Solver, Method::Marino];
+            laid_flat(&tree, &Params { w_placement, methods, ..Params::default() })
+        };
+        let (exact, asked) = (with_placement(0.01), with_placement(1.0));
+        let lossless = |embedding: &Embedding| embedding.energy.length + embedding.energy.angle == 0.0;
+        if !lossless(&exact) || exact.energy.placement == 0.0 {
+            continue;
+        }
+        assert_eq!(exact.termination, Termination::Optimal, "tree {key}");
+        // The exact layout is one of those that may be had at the new weights too.
+        assert!(asked.energy.total() <= 100.0 * exact.energy.placement * (1.0 + 1e-9), "tree {key}");
+        let solver = asked.methods.iter().find(|row| row.method == "solver").expect("its row");
+        let marino = asked.methods.iter().find(|row| row.method == "marino").expect("its row");
+        assert!(solver.energy.total() <= marino.energy.total(), "tree {key}: {solver:?} {marino:?}");
+        if !lossless(&asked) {
+            assert!(asked.energy.placement < 100.0 * exact.energy.placement, "tree {key}");
+            assert_ne!(asked.termination, Termination::Optimal, "tree {key}");
+            n_traded += 1;
+        }
+    }
+    assert!(n_traded > 3, "{n_traded}");
+}
+
+#[test]
+fn only_what_loses_nothing_is_called_optimal() {
+    let mut n_bent = 0;
+    for key in 0..16 {
+        let tree = random_tree(key as usize % 8, 60, 1.0, false, key);
+        let embedding = laid_flat(&tree, &Params { w_length: 0.0, w_angle: 0.0, ..small() });
+        let is_exact = embedding.length_ratio.iter().chain(&embedding.angle_ratio).all(|&ratio| ratio == 0.0);
+        assert_eq!(embedding.termination == Termination::Optimal, is_exact, "tree {key}");
+        n_bent += usize::from(!is_exact);
+    }
+    assert!(n_bent > 0);
 }

@@ -5,9 +5,9 @@
 mod common;
 
 use common::{FAMILIES, random_tree, tree_of, views_along};
-use espalier_embed::{Embedded, Method, Params, WidthsMode, WidthsParams, embed};
+use espalier_embed::{Embedded, Method, Params, WidthsMode, WidthsParams, embed, embed_edited};
 use espalier_geom::math;
-use espalier_model::{Termination, Tree, WidthMode};
+use espalier_model::{Edit, Edits, Termination, Tree, WidthMode};
 use glam::DVec3;
 
 /// The cone, and what is asked for about its widths.
@@ -158,4 +158,31 @@ fn avoiding_leaves_fewer_overlaps_and_no_crossings() {
         n_avoided += usize::from(found.overlaps > 0 && avoided.widths.overlaps == 0);
     }
     assert!(2 * n_avoided > n_overlapping && n_overlapping > 2, "{n_avoided} of {n_overlapping}");
+}
+
+#[test]
+fn what_avoids_overlaps_avoids_them_after_an_edit_too() {
+    let (mut n_avoided, mut n_kept) = (0, 0);
+    for key in 0..24 {
+        let tree = random_tree(key as usize % 8, 40, 1.0, false, key);
+        let thick = with_radius(&tree, |_| 0.12);
+        let last = thick.branches().list().len() - 1;
+        let node = thick.parent(thick.branches().list()[last].nodes.start).expect("it hangs from a node");
+        let edits = Edits::new(&thick, vec![Edit { branch: last, node, angle_deg: 12.0 }]).expect("an edit");
+        for mode in [WidthsMode::Avoid, WidthsMode::Stretch] {
+            let params = Params { methods: Vec::new(), widths: WidthsParams { mode }, ..Params::default() };
+            let views = views_along(&thick, DVec3::Z);
+            let before = embed(&thick, &views, &params, 0, &|_| {}).expect("a certified layout").embedding;
+            let Ok(after) = embed_edited((&thick, &views), &edits, &params, 0, &|_| {}) else { continue };
+            let (widths, warnings) = (after.embedding.widths, after.report.warnings);
+            let is_told = warnings.iter().any(|warning| warning.code == "W-EMBED-OVERLAPS");
+            assert_eq!(is_told, widths.overlaps > 0, "tree {key}: {widths:?}");
+            assert!(mode == WidthsMode::Avoid || widths.overlaps == 0, "tree {key}: {widths:?}");
+            if before.widths.overlaps == 0 {
+                n_avoided += 1;
+                n_kept += usize::from(widths.overlaps == 0);
+            }
+        }
+    }
+    assert!(n_avoided > 20 && 10 * n_kept >= 9 * n_avoided, "{n_kept} of {n_avoided}");
 }

@@ -117,7 +117,8 @@ impl Stage {
         match self {
             Self::Phantom | Self::Views => 1,
             Self::Skeleton | Self::Radius | Self::Tree => 2,
-            Self::Volume | Self::Embed | Self::Render | Self::Report => 3,
+            Self::Volume | Self::Render | Self::Report => 3,
+            Self::Embed => 4,
         }
     }
 

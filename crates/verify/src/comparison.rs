@@ -49,6 +49,13 @@ pub fn check_comparison(claim: &Claim<'_>, comparison: &Comparison) -> Vec<Check
             (!rows.iter().copied().eq(&embedding.methods)).then(|| "not those of the embedding".to_owned()),
         ),
     ];
+    let is_curve = |layout: &ComparedLayout| layout.trace == embedding.trace;
+    let has_curve = embedding.trace.is_empty() || comparison.layouts.iter().any(is_curve);
+    checks.push(Check::unless(
+        "trace of the result",
+        format!("{} points", embedding.trace.len()),
+        (!has_curve).then(|| "not that of any layout".to_owned()),
+    ));
     for layout in &comparison.layouts {
         let scored = Compared { claim, branches: &branches, weights: &weights, layout };
         let stated = format!("{} crossings, energy {:.6}", layout.row.crossings, layout.row.energy.total());

@@ -286,16 +286,18 @@ fn check_edits(claim: &Claim<'_>, own: &MethodRow) -> Option<Check> {
     Some(Check::unless("edits", format!("{} made", edits.len()), fault))
 }
 
-/// Nothing that costs is lost, or it is not called optimal.
+/// It is called optimal where all ratios are zero and nothing crosses, and nowhere else.
 fn check_optimal(embedding: &Embedding) -> Check {
     let is_lost = |ratios: &[f64]| ratios.iter().position(|&ratio| ratio != 0.0);
     let is_stated = embedding.termination == Termination::Optimal;
     let (length, angle) = (is_lost(&embedding.length_ratio), is_lost(&embedding.angle_ratio));
-    let costs = embedding.energy.length + embedding.energy.angle > 0.0;
     let fault = match (length, angle) {
-        (Some(node), _) if is_stated && costs => Some(format!("the length of node {node} is lost")),
-        (_, Some(node)) if is_stated && costs => Some(format!("the angle of node {node} is lost")),
+        (Some(node), _) if is_stated => Some(format!("the length of node {node} is lost")),
+        (_, Some(node)) if is_stated => Some(format!("the angle of node {node} is lost")),
         _ if is_stated && embedding.certificate.crossings > 0 => Some("there are crossings".to_owned()),
+        (None, None) if !is_stated && embedding.certificate.crossings == 0 => {
+            Some("nothing is lost: it is optimal".to_owned())
+        }
         _ => None,
     };
     Check::unless("termination", embedding.termination.name(), fault)

@@ -24,23 +24,22 @@ const TURNED_RAD: f64 = 1e-6;
 pub(crate) fn check_pose(tree: &Tree, embedding: &Embedding) -> Vec<Check> {
     let positions = &embedding.positions_mm;
     let at_origin = (positions[0] != DVec2::ZERO).then(|| format!("the root lies at {}", positions[0]));
-    let stated = format!(
-        "turned by {:.3}°{}",
-        embedding.pose.rotation_rad.to_degrees(),
-        if embedding.pose.is_reflected { ", reflected" } else { "" }
-    );
+    let turned = format!("{:.3}°", embedding.pose.rotation_rad.to_degrees());
+    let turned = Check::untested("pose: rotation", turned, "the layout before it is not in the files");
+    let stated = if embedding.pose.is_reflected { "reflected" } else { "not reflected" };
     let root = Check::unless("pose: root", "at the origin", at_origin);
     // What was edited lies as the layout lay of which it was made.
     if !embedding.edits.is_empty() || embedding.widths.mode != WidthMode::Report {
-        return vec![root, Check::untested("pose", stated, "taken over from the layout before")];
+        return vec![root, turned, Check::untested("pose", stated, "taken over from the layout before")];
     }
     let seen = Seen::new(tree, embedding);
     let hangs = hangs(tree, positions);
     let lies = seen.lies_as_seen() || hangs;
     vec![
         root,
-        Check::unless("pose: side", stated.clone(), seen.wrong_side(embedding.pose.is_reflected)),
-        Check::unless("pose", stated, (!lies).then(|| "neither as the view nor from its root".to_owned())),
+        turned,
+        Check::unless("pose: side", stated, seen.wrong_side(embedding.pose.is_reflected)),
+        Check::unless("pose", "upright", (!lies).then(|| "neither as the view nor from its root".to_owned())),
     ]
 }
 

@@ -57,4 +57,11 @@ impl Layout {
             aim: Aim::Frozen,
         }
     }
+
+    /// The same after a search before it that is part of its method.
+    pub(crate) fn after(mut self, evaluations: u64) -> Self {
+        self.evaluations += evaluations;
+        self.trace.iter_mut().for_each(|point| point.evaluations += evaluations);
+        self
+    }
 }

@@ -59,7 +59,7 @@ pub(crate) fn layout(
 
     // P_g ← P_0: where the targets have no crossing the loop has nothing to do.
     let targets = vec![0.0; dofs.dims()];
-    if energy.is_planar(&targets, &mut Scratch::default()) {
+    if !problem.trades_placement && energy.is_planar(&targets, &mut Scratch::default()) {
         return Ok(targets_met(&energy, &name, &targets, params, progress));
     }
     let start = start::start(&energy, &incumbents, params, seed);
@@ -81,7 +81,7 @@ pub(crate) fn polish(
         ..params.clone()
     };
     let dofs = DofMap::new(problem, params.freedom);
-    if dofs.dims() == 0 || !targets_cross(problem) {
+    if dofs.dims() == 0 || !(targets_cross(problem) || problem.trades_placement) {
         return Ok(None);
     }
     check_memory(params, dofs.dims())?;
@@ -113,7 +113,7 @@ fn search(
     swarm.evaluate(energy);
     swarm.record(0, params, progress);
     for iteration in 1..=params.iterations {
-        if swarm.has_no_loss(dofs) {
+        if swarm.has_no_loss(dofs) && !energy.problem.trades_placement {
             break;
         }
         swarm.step(&rule, (seed, iteration));
@@ -211,10 +211,11 @@ impl Swarm {
     }
 
     fn into_layout(self, energy: &CpuEnergy, name: &str) -> Layout {
+        let has_no_loss = self.has_no_loss(energy.dofs);
         Layout {
             evaluations: self.evaluations,
             trace: self.trace,
-            termination: Termination::BudgetSpent,
+            termination: if has_no_loss { Termination::Optimal } else { Termination::BudgetSpent },
             ..Layout::constructed(name, energy.positions(&self.global_best))
         }
     }

@@ -12,7 +12,7 @@
 //! A ratio whose last move met a certain pair of edges asks that pair first: most moves that fail do so on the pair
 //! on which they failed before.
 //! **Guarantees** no crossing, no higher energy (Eq. 4 with the placement term), ratios in range; sweeps in a fixed
-//! order, the budget counted. A layout that meets its targets stays.
+//! order, the budget counted. A layout that meets its targets stays, unless placement is more than a tie-break.
 //! **Source** ours. **Cost** about log² N and what is near for each move tried.
 
 use std::ops::Range;
@@ -54,7 +54,7 @@ pub(crate) fn descend_within<'a>(
 ) {
     let mut descent = Descent::new(problem, linkage, window.clone());
     let mut energy = descent.energy();
-    while !work.is_spent() && descent.loss() > LEAST_LOSS {
+    while !work.is_spent() && descent.excess() > LEAST_LOSS {
         // Nothing of the size of the whole tree where only a subtree counts: there energies fall at each change.
         let before = descent.linkage.placement.is_some().then(|| descent.linkage.shape.clone());
         descent.sweep(work);
@@ -70,7 +70,7 @@ pub(crate) fn descend_within<'a>(
             descent.linkage.set_shape(before);
             break;
         }
-        if energy - now < LEAST_GAIN * descent.loss() {
+        if energy - now < LEAST_GAIN * descent.excess() {
             break;
         }
         energy = now;
@@ -122,8 +122,13 @@ impl<'a, 'b> Descent<'a, 'b> {
         self.loss() + self.linkage.placement.as_ref().map_or(0.0, |placement| placement.total)
     }
 
+    /// What there is to lower: the loss, and the placement term where that counts as much.
+    fn excess(&self) -> f64 {
+        if self.problem.trades_placement { self.energy() } else { self.loss() }
+    }
+
     fn sweep(&mut self, work: &mut Work) {
-        self.need = LEAST_GAIN * self.loss() / (self.window.len() + self.segments.len()) as f64;
+        self.need = LEAST_GAIN * self.excess() / (self.window.len() + self.segments.len()) as f64;
         let angles = self.window.clone().map(Joint::Angle);
         let lengths = self.segments.clone().map(Joint::Length);
         let mut joints: Vec<(f64, Joint)> = angles

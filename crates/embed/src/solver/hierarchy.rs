@@ -21,7 +21,7 @@ use espalier_geom::plane::Segment;
 use glam::DVec2;
 
 use super::joint::Pieces;
-use super::oriented_box::Box2;
+use super::oriented_box::OrientedBox;
 use super::similarity::Similarity;
 
 /// Edges in a block: fewer make more boxes, more make more pairs of edges in blocks that are near.
@@ -30,7 +30,7 @@ const BLOCK: usize = 4;
 /// A node of the hierarchy.
 #[derive(Clone, Copy)]
 struct Node {
-    bounds: Box2,
+    bounds: OrientedBox,
     /// What the nodes below have still to go through.
     waiting: Option<Similarity>,
 }
@@ -50,7 +50,7 @@ pub(crate) struct Hierarchy {
     /// Both ends of each edge, the parent's first, as the leaf has them.
     edges: Vec<Segment>,
     /// For the question at hand: upright boxes of nodes with several pieces below them.
-    mixed: Vec<Box2>,
+    mixed: Vec<OrientedBox>,
     stack: Vec<(u32, u32)>,
     /// Boxes and pairs of edges looked at so far.
     pub(crate) n_looked: u64,
@@ -61,13 +61,13 @@ impl Hierarchy {
     pub(crate) fn new(parent: &[u32], positions: &[DVec2]) -> Self {
         let n_edges = positions.len();
         let n_leaves = n_edges.div_ceil(BLOCK).next_power_of_two();
-        let empty = Node { bounds: Box2::EMPTY, waiting: None };
+        let empty = Node { bounds: OrientedBox::EMPTY, waiting: None };
         let mut hierarchy = Self {
             n_edges,
             n_leaves,
             nodes: vec![empty; 2 * n_leaves],
             edges: vec![Segment { a: DVec2::ZERO, b: DVec2::ZERO }; n_edges],
-            mixed: vec![Box2::EMPTY; 2 * n_leaves],
+            mixed: vec![OrientedBox::EMPTY; 2 * n_leaves],
             stack: Vec::new(),
             n_looked: 0,
         };
@@ -152,7 +152,7 @@ impl Hierarchy {
         // The root has no edge.
         let range = self.range(leaf);
         let edges = &self.edges[range.start.max(1).min(range.end)..range.end];
-        self.nodes[leaf].bounds = Box2::around(edges);
+        self.nodes[leaf].bounds = OrientedBox::around(edges);
     }
 
     /// The edges below a node.
@@ -223,10 +223,10 @@ impl Hierarchy {
 
     /// Finds the boxes of nodes with several pieces below them, from a node down; the upright box of the node. Goes
     /// down log N levels.
-    fn mix(&mut self, node: usize, pieces: &Pieces, window: &Range<usize>) -> Box2 {
+    fn mix(&mut self, node: usize, pieces: &Pieces, window: &Range<usize>) -> OrientedBox {
         let own = clip(self.range(node), window);
         if own.is_empty() {
-            return Box2::EMPTY;
+            return OrientedBox::EMPTY;
         }
         if let Some(piece) = pieces.whole(&own) {
             return self.nodes[node].bounds.moved(&pieces.motions[piece]).upright();
@@ -236,7 +236,7 @@ impl Hierarchy {
             let (from, to) = (own.start.max(1), own.end);
             let moved = |edge: usize| moved(&self.edges[edge], &pieces.motions[pieces.of(edge)]);
             let ends = (from..to).map(moved).flat_map(|edge| [edge.a, edge.b]);
-            if from < to { Box2::of_points(ends, DVec2::X) } else { Box2::EMPTY }
+            if from < to { OrientedBox::of_points(ends, DVec2::X) } else { OrientedBox::EMPTY }
         } else {
             self.hand_down(node);
             let (first, second) =

@@ -14,14 +14,17 @@
 //!
 //! **Input** the problem, and crossing-free headings. **Output** a layout without crossings, why the search ended,
 //! and the curve of its energy.
-//! **Steps** Where the targets themselves do not cross there is nothing to do; where they cross everywhere, the cone is
-//! brought down a little. Else both starts, each on a thread of
+//! **Steps** Where the targets themselves do not cross there is nothing to do (unless w_g asks for headings rather than
+//! for exact angles); where they cross everywhere, the cone is brought down a little. Else both starts, each on a thread of
 //! its own. The cone: descend; then barrier and descent in turn until a round gains less than 3 %. The targets: the
 //! barrier until a round gains less than 3 %, then one descent. The better one wins. Why the two differ: where there is
 //! more to do than work to do it with, early descents save the barrier the most of it (a neuron of 9532 nodes ends at
 //! the energy 11 with them, at 39 without; one of 49,695 at 53 and 387); where there is not, they bring the layout near
 //! others that it cannot leave (from the targets, neurons of 4696 and 4332 nodes and an airway of 4099 end at 23.2, 22.3
 //! and 24.5 with them, at 18.0, 20.6 and 18.5 without).
+//! Why nothing is simplified first and refined later: the hierarchies move whole subtrees at the cost of what is near
+//! them, so that 1000 nodes take 3.2 s in a neuron of 10,000 nodes, 4.8 s in one of 30,000 and 4.1 s in one of 60,000
+//! (`scripts/bench-embed --scale`); and the bends inside a branch, which simplifying drops, are what is to be kept.
 //! A thread, a tree of next to nothing but chain, is only brought down from the cone: all parts together lower the
 //! energy of 100,000 turns in one segment by half a percent, in 40 s.
 //! **Guarantees** every shape that is kept is free of crossings, and the energy of each start never rises; the same
@@ -77,7 +80,7 @@ pub(crate) fn layout(problem: &Problem, cone: &[f64], params: &Params) -> Layout
     let separation = Separation::new(problem, params.solver.clearance);
     let targets = Shape::targets(problem);
     let prospect = Prospect::of(problem);
-    if prospect == Prospect::Free {
+    if prospect == Prospect::Free && !problem.trades_placement {
         let mut run = Run::new(problem, &params.solver, targets);
         run.record(Phase::Start);
         return run.end();
@@ -145,7 +148,7 @@ impl<'a> Run<'a> {
 
     /// Barrier and descent, as long as it pays. What has no loss is left as it is.
     fn improve(&mut self, separation: &Separation, descents: Descents) {
-        if self.is_lossless() {
+        if self.is_final() {
             return;
         }
         if descents == Descents::BetweenBarriers {
@@ -190,14 +193,19 @@ impl<'a> Run<'a> {
         self.record(phase);
     }
 
-    /// Whether all ratios are zero, so that nothing can be better but the placement.
+    /// Whether nothing that costs is lost, so that nothing can be better but the placement.
     fn is_lossless(&self) -> bool {
         self.shape.loss(self.problem) == 0.0
     }
 
-    /// Without loss, or else of less energy.
+    /// Whether that is all that is asked for.
+    fn is_final(&self) -> bool {
+        self.is_lossless() && !self.problem.trades_placement
+    }
+
+    /// Final, or else of less energy.
     fn is_better(&self, other: &Self) -> bool {
-        let key = |run: &Self| (!run.is_lossless(), run.energy());
+        let key = |run: &Self| (!run.is_final(), run.energy());
         key(self) <= key(other)
     }
 

@@ -9,13 +9,13 @@ use super::similarity::Similarity;
 
 /// A box with its own axes; without edges if a half width is negative.
 #[derive(Clone, Copy)]
-pub(super) struct Box2 {
+pub(super) struct OrientedBox {
     center: DVec2,
     axis: DVec2,
     half: DVec2,
 }
 
-impl Box2 {
+impl OrientedBox {
     pub(super) const EMPTY: Self = Self { center: DVec2::ZERO, axis: DVec2::X, half: DVec2::NEG_ONE };
 
     fn is_empty(&self) -> bool {

@@ -61,12 +61,31 @@ pub(crate) fn change(problem: &Problem, positions: &[DVec2], params: &Params) ->
     let shape = avoid::avoid(problem, &params.solver, &nearest_shape(problem, positions));
     let avoided = shape.map(|shape| shape.positions(problem));
     let avoided = avoided.filter(|avoided| measure(problem, avoided).overlaps < found.overlaps);
-    if mode == WidthsMode::Avoid {
-        return avoided.map(|positions| Changed { positions, length_scale: 1.0 });
+    let is_same = avoided.is_none();
+    let positions = avoided.unwrap_or_else(|| positions.to_vec());
+    let length_scale = stretch(problem, params, &positions);
+    if is_same && length_scale == 1.0 {
+        return None;
     }
-    let shape = avoided.unwrap_or_else(|| positions.to_vec());
-    let length_scale = stretch::least_scale(problem, &shape)?;
-    Some(Changed { positions: shape.into_iter().map(|place| place * length_scale).collect(), length_scale })
+    Some(Changed {
+        positions: positions.into_iter().map(|place| place * length_scale).collect(),
+        length_scale,
+    })
+}
+
+/// The shape with fewer overlaps, if there are any, the params ask for it, and one is found; what may not change in the
+/// problem stays.
+pub(crate) fn avoided(problem: &Problem, params: &Params, shape: &Shape) -> Option<Shape> {
+    let asks = params.widths.mode != WidthsMode::Report;
+    let found = asks.then(|| measure(problem, &shape.positions(problem)))?;
+    let has_some = found.overlaps > 0 && found.is_complete;
+    has_some.then(|| avoid::avoid(problem, &params.solver, shape)).flatten()
+}
+
+/// The least scale of the lengths at which nothing overlaps, where the params ask for it.
+pub(crate) fn stretch(problem: &Problem, params: &Params, positions: &[DVec2]) -> f64 {
+    let asks = params.widths.mode == WidthsMode::Stretch;
+    asks.then(|| stretch::least_scale(problem, positions)).flatten().unwrap_or(1.0)
 }
 
 /// The ratios of a layout: its own, if it was made by ratios.

@@ -131,7 +131,11 @@ const NAMES: [CompareColumn; 4] = [
 
 const PROVENANCE: [CompareColumn; 2] = [
     CompareColumn {
-        column: Column::new("evaluations", "1", "how often the method evaluated an energy"),
+        column: Column::new(
+            "evaluations",
+            "1",
+            "how often the method evaluated an energy; of the solver with the moves that its search for sides weighed",
+        ),
         better: Better::Neither,
         cell: CompareCell::Number(Digits::Decimals(0), |row| row.evaluations as f64),
     },

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use super::super::work::Work;
 use super::contact::{Contact, Ends, Push, are_apart};
 use crate::problem::Problem;
-use crate::runs::{Box2, Lanes, MIXED, RUN, is_same_fan};
+use crate::runs::{Lanes, MIXED, RUN, UprightBox, is_same_fan};
 
 /// The skin as a share of the reach. A wider one lists more pairs and is left as soon where whole subtrees turn: on an
 /// airway of 4099 nodes the first relaxing takes 575 million units of work at .35, 445 at .15, 389 at .05.
@@ -76,7 +76,7 @@ pub(super) struct PairList {
     hubs: Vec<u32>,
     lanes: Vec<Lanes>,
     /// Boxes over runs, two by two: box b holds the boxes 2b and 2b + 1, the last ones are those of runs.
-    boxes: Vec<Box2>,
+    boxes: Vec<UprightBox>,
     chunks: Vec<Chunk>,
 }
 
@@ -99,7 +99,7 @@ impl PairList {
         };
         let hubs: Vec<u32> = order.chunks(RUN).map(hub).collect();
         let lanes = vec![Lanes::EMPTY; hubs.len()];
-        let boxes = vec![Box2::EMPTY; 2 * hubs.len().next_power_of_two()];
+        let boxes = vec![UprightBox::EMPTY; 2 * hubs.len().next_power_of_two()];
         Self { order, hubs, lanes, boxes, ..Self::default() }
     }
 
@@ -173,7 +173,7 @@ impl PairList {
     fn fit_boxes<S: Spacing>(&mut self, search: &Search<S>) {
         let first_leaf = self.boxes.len() / 2;
         for (run, edges) in self.order.chunks(RUN).enumerate() {
-            let mut all = Box2::EMPTY;
+            let mut all = UprightBox::EMPTY;
             for (lane, &edge) in edges.iter().enumerate() {
                 let bounds = search.bounds_of(edge as usize);
                 self.lanes[run].set(lane, bounds);
@@ -216,7 +216,7 @@ struct Runs<'a> {
     order: &'a [u32],
     hubs: &'a [u32],
     lanes: &'a [Lanes],
-    boxes: &'a [Box2],
+    boxes: &'a [UprightBox],
 }
 
 impl Chunk {
@@ -310,12 +310,12 @@ impl<S: Spacing> Search<'_, S> {
     }
 
     /// A box such that boxes of edges meet that are within reach.
-    fn bounds_of(&self, edge: usize) -> Box2 {
+    fn bounds_of(&self, edge: usize) -> UprightBox {
         let per_mm = 1.0 / self.problem.scale_mm;
         let margin_mm = self.spacing.thickness_mm(edge) + 0.5 * self.reach_mm;
         let (a, b) = self.ends(edge);
         let (a, b) = (a * per_mm, b * per_mm);
-        Box2::around((a.x, a.y), (b.x, b.y), margin_mm * per_mm)
+        UprightBox::around((a.x, a.y), (b.x, b.y), margin_mm * per_mm)
     }
 
     /// The pair of two edges, if it is wanted.
