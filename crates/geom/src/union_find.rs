@@ -12,7 +12,8 @@
 /// let mut sets = UnionFind::new(5);
 /// assert!(sets.join(4, 1) && sets.join(3, 4) && !sets.join(1, 3));
 /// assert_eq!((sets.find(3), sets.find(2)), (1, 2));
-/// assert_eq!(sets.into_numbers(), (vec![0, 1, 2, 1, 1], 3));
+/// sets.add(1);
+/// assert_eq!(sets.into_numbers(), (vec![0, 1, 2, 1, 1, 3], 4));
 /// ```
 #[derive(Clone, Debug)]
 pub struct UnionFind {
@@ -24,6 +25,12 @@ impl UnionFind {
     #[must_use]
     pub fn new(n: usize) -> Self {
         Self { parent: (0..n).collect() }
+    }
+
+    /// Adds so many numbers after the last, each in a set of its own.
+    pub fn add(&mut self, n: usize) {
+        let first = self.parent.len();
+        self.parent.extend(first..first + n);
     }
 
     /// The lowest number in the set of `member`.

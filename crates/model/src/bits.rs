@@ -5,7 +5,11 @@
 //! **Guarantees** each row begins a word, and the bits beyond nx in its last word are 0, so that words can be counted,
 //! compared and shifted without a look at the end.
 
+mod euler;
+
 use std::ops::Range;
+
+pub use euler::EULER_OF_BLOCK;
 
 /// Bits in a word.
 const WORD: usize = u64::BITS as usize;

@@ -19,7 +19,7 @@
 //! **Spaces** World points are RAS+ mm; voxel coordinates are (x, y, z) with the voxel's centre at whole
 //! numbers; picture points are plane mm.
 //!
-//! **Architecture Invariant:** no algorithms here, and no file access: files are bytes in and bytes out.
+//! **Architecture Invariant:** no algorithms here, though bits can be counted, and no file access: files are bytes in and bytes out.
 
 /// How far a coordinate or a radius of a traced tree may be from 0, in mm: far beyond any organ in any unit that
 /// somebody took for mm, and a tenth of what a picture holds.
@@ -54,7 +54,7 @@ pub mod vtp_out;
 pub mod xml;
 
 pub use anatomy::{Anatomy, BranchMeasures, Region};
-pub use bits::Bits;
+pub use bits::{Bits, EULER_OF_BLOCK};
 pub use diagnose::Diagnose;
 pub use edits::{Edit, EditError, Edits};
 pub use embedding::{

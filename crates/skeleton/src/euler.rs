@@ -12,36 +12,9 @@
 
 use std::sync::LazyLock;
 
+use espalier_model::EULER_OF_BLOCK;
+
 use crate::simple::CENTER;
-
-/// χ₈ of each of the 256 sets of a 2×2×2 block; voxel (x, y, z) of the block is bit 4z + 2y + x.
-const EULER_OF_BLOCK: [i8; 256] = {
-    let mut table = [0; 256];
-    let mut block = 0;
-    while block < 256 {
-        table[block] = euler_of_block(block as u8);
-        block += 1;
-    }
-    table
-};
-
-/// The voxels of a block on the upper side of x, y, z.
-const UPPER_HALF: [u8; 3] = [0b1010_1010, 0b1100_1100, 0b1111_0000];
-
-const fn euler_of_block(block: u8) -> i8 {
-    let mut twice_halves = 0;
-    let mut axis = 0;
-    while axis < 3 {
-        // The two edges from the vertex along this axis; four voxels share each.
-        twice_halves -= 4 * (block & UPPER_HALF[axis] != 0) as i8;
-        twice_halves -= 4 * (block & !UPPER_HALF[axis] != 0) as i8;
-        // The four faces across this axis; the two voxels on their sides share each.
-        let pairs = (block | block >> (1 << axis)) & !UPPER_HALF[axis];
-        twice_halves += 2 * pairs.count_ones() as i8;
-        axis += 1;
-    }
-    8 * (block != 0) as i8 + twice_halves - block.count_ones() as i8
-}
 
 /// 8 × the amount by which the Euler number falls when the centre of `neighborhood` is removed.
 pub(crate) fn euler_change(neighborhood: u32) -> i32 {

@@ -31,7 +31,8 @@ use crate::simple::is_simple;
 
 /// Depths are up to 8 % shorter than distances, and balls are painted apart.
 const REACH: f64 = 1.1;
-/// How far out the end of a lost branch lies at least, in means of the smallest and the largest spacing.
+/// How far out the end of a lost branch lies at least, in geometric means of the smallest and the largest spacing. By the
+/// arithmetic mean, a fifth more on slices of 0.7 × 0.7 × 2.5 mm, rough vessels lost one tip in a hundred more there.
 const MIN_CELLS: f64 = 2.5;
 /// And as a share of the depth where it begins: the corner of a square tube's end has three quarters.
 const MIN_SHARE: f64 = 1.0;
@@ -157,7 +158,7 @@ impl Bare {
         let spacing = lattice.spacing();
         let smallest = spacing.into_iter().fold(f64::INFINITY, f64::min);
         let largest = spacing.into_iter().fold(0.0, f64::max);
-        let least = (MIN_CELLS * UNITS_PER_SPACING * 0.5 * (smallest + largest) / smallest) as u32;
+        let least = (MIN_CELLS * UNITS_PER_SPACING * (largest / smallest).sqrt()) as u32;
         let mut is_seen = BTreeSet::new();
         let mut ends = Vec::new();
         for &first in self.out.keys() {

@@ -2,12 +2,12 @@
 //!
 //! **Input** a padded box of bits. **Output** counts. **Notation** χ = components − tunnels + cavities.
 //! **Steps** 1. Join the runs of neighbouring rows that touch, by union and find: what is left apart are the
-//! components. 2. χ = vertices − edges + faces − voxels of the union of closed voxel cubes, 64 positions at a time: an
-//! edge is there if one of its four voxels is, and so on.
+//! components. 2. χ as bits tell it ([`Bits::euler_number`]).
 //! **Cost** O(words of the box + runs).
 
 use std::ops::Range;
 
+use espalier_geom::union_find::UnionFind;
 use espalier_model::{Bits, Report};
 
 /// What is counted of an object.
@@ -21,25 +21,25 @@ pub(crate) struct Topology {
 
 /// Counts a box whose outermost layer is background.
 pub(crate) fn measure(bits: &Bits) -> Topology {
-    Topology { n_components: n_components(bits), euler_number: euler_number(bits) }
+    Topology { n_components: n_components(bits), euler_number: bits.euler_number() }
 }
 
 /// The number of 26-connected components.
 fn n_components(bits: &Bits) -> usize {
     let ny = bits.shape()[1];
-    let mut parents: Vec<usize> = Vec::new();
+    let mut sets = UnionFind::new(0);
     let mut n_components = 0;
     let [mut before, mut here] = [Slab::default(), Slab::default()];
     for z in 0..bits.shape()[2] {
         std::mem::swap(&mut before, &mut here);
-        here.read(bits, z, parents.len());
-        parents.extend(here.base..here.base + here.runs.len());
+        here.read(bits, z, before.base + before.runs.len());
+        sets.add(here.runs.len());
         n_components += here.runs.len();
         // A row with foreground lies within the padding, so y − 1 and y + 1 are rows.
         for y in (1..ny).filter(|&y| !here.row(y).is_empty()) {
-            n_components -= join_touching(&mut parents, (&here, y - 1), (&here, y));
+            n_components -= join_touching(&mut sets, (&here, y - 1), (&here, y));
             for neighbor in y - 1..=y + 1 {
-                n_components -= join_touching(&mut parents, (&before, neighbor), (&here, y));
+                n_components -= join_touching(&mut sets, (&before, neighbor), (&here, y));
             }
         }
     }
@@ -76,64 +76,18 @@ impl Slab {
 }
 
 /// Joins the runs of two rows that touch; returns how many unions that took.
-fn join_touching(parents: &mut [usize], (there, ty): (&Slab, usize), (here, hy): (&Slab, usize)) -> usize {
+fn join_touching(sets: &mut UnionFind, (there, ty): (&Slab, usize), (here, hy): (&Slab, usize)) -> usize {
     let (mut a, mut b) = (there.row(ty), here.row(hy));
     let mut n_joined = 0;
     while !a.is_empty() && !b.is_empty() {
         let (there_run, here_run) = (&there.runs[a.start], &here.runs[b.start]);
         // An end is the voxel after the last: runs that meet at a corner touch.
         if there_run.start <= here_run.end && here_run.start <= there_run.end {
-            let (root, other) = (find(parents, there.base + a.start), find(parents, here.base + b.start));
-            n_joined += usize::from(root != other);
-            parents[root.max(other)] = root.min(other);
+            n_joined += usize::from(sets.join(there.base + a.start, here.base + b.start));
         }
         if there_run.end < here_run.end { a.start += 1 } else { b.start += 1 }
     }
     n_joined
-}
-
-/// The first run of a run's set. Each run on the way is handed on to its grandparent.
-fn find(parents: &mut [usize], mut run: usize) -> usize {
-    while parents[run] != run {
-        parents[run] = parents[parents[run]];
-        run = parents[run];
-    }
-    run
-}
-
-/// χ of the union of closed voxel cubes.
-fn euler_number(bits: &Bits) -> i64 {
-    let [row_words, ny] = [bits.words_per_row(), bits.shape()[1]];
-    let words = bits.words();
-    let [row, slab] = [row_words, row_words * ny];
-    let mut euler_number = 0;
-    for start in (slab + row..words.len()).step_by(row) {
-        // The last words of the four voxels about an edge along x: (y, z), (y − 1, z), (y, z − 1), (y − 1, z − 1).
-        let mut last = [0; 4];
-        for word in start..start + row {
-            let four = [words[word], words[word - row], words[word - slab], words[word - slab - row]];
-            if four != [0; 4] || last != [0; 4] {
-                euler_number += euler_of_word(four, last);
-            }
-            last = four;
-        }
-    }
-    euler_number
-}
-
-/// What the cells with their highest voxel in one of 64 places add to χ.
-fn euler_of_word(four: [u64; 4], last: [u64; 4]) -> i64 {
-    let count = |bits: u64| i64::from(bits.count_ones());
-    // A voxel or its neighbour at x − 1.
-    let pair = |bits: u64, last: u64| bits | bits << 1 | last >> 63;
-    let [voxels, y, z, yz] = four;
-    let faces = count(voxels | y) + count(voxels | z) + count(pair(voxels, last[0]));
-    let along_x = voxels | y | z | yz;
-    let edges = count(along_x)
-        + count(pair(voxels | z, last[0] | last[2]))
-        + count(pair(voxels | y, last[0] | last[1]));
-    let vertices = count(pair(along_x, last[0] | last[1] | last[2] | last[3]));
-    vertices - edges + faces - count(voxels)
 }
 
 /// Writes both into the report, with a warning where they differ.

@@ -11,11 +11,12 @@
 //! **Why from tips and junctions only?** A vessel goes on where it ends. An island alongside a vessel has its ends there,
 //! too.
 //! **Guarantees** joining makes no loop: every island gets one bridge.
-//! **Cost** O(hubs of islands × samples), for at most [`MAX_ISLANDS`] islands.
+//! **Cost** O(samples · log² samples + islands · their hubs · log samples), for at most [`MAX_ISLANDS`] islands.
 
 use espalier_model::{Ledger, LedgerEntry, LedgerKind};
 
 use crate::graph::{Graph, Hub, Piece, Sample};
+use crate::nearest::NearestSphere;
 
 /// The most islands that are looked at, the longest first: real forests have hundreds, noise has any number.
 pub(crate) const MAX_ISLANDS: usize = 1000;
@@ -68,8 +69,13 @@ pub(crate) fn join(
         islands.iter().map(|island| (*island, hubs_of(&places[island.component]))).collect();
     let (mut bridges, mut joined, mut newest) = (Vec::new(), Vec::new(), tree);
     loop {
+        let newcomers = NearestSphere::of(places[newest].iter().map(|&(_, sample)| sample));
         for &hub in left.iter().flat_map(|(_, hubs)| hubs) {
-            look(&mut nearest[hub], graph.hubs[hub].sample, &places[newest]);
+            let least_mm = nearest[hub].map_or(f64::INFINITY, |nearest| nearest.gap_mm);
+            if let Some((index, gap_mm)) = newcomers.look(graph.hubs[hub].sample, least_mm) {
+                let (place, sample) = places[newest][index];
+                nearest[hub] = Some(Nearest { gap_mm, place, sample });
+            }
         }
         // The island with the least gap, and the hub that has it.
         let mut best: Option<(f64, usize, usize)> = None;
@@ -116,19 +122,6 @@ fn hubs_of(places: &[(Place, Sample)]) -> Vec<usize> {
         Place::Between(..) => None,
     };
     places.iter().map_while(hub).collect()
-}
-
-/// Keeps the nearest of `places` if it is nearer than what was nearest before.
-fn look(nearest: &mut Option<Nearest>, from: Sample, places: &[(Place, Sample)]) {
-    let mut best_mm = nearest.map_or(f64::INFINITY, |nearest| nearest.gap_mm);
-    for &(place, sample) in places {
-        let apart_mm = from.position_mm.distance(sample.position_mm);
-        let gap_mm = (apart_mm - from.radius_mm - sample.radius_mm).max(0.0);
-        if gap_mm < best_mm {
-            best_mm = gap_mm;
-            *nearest = Some(Nearest { gap_mm, place, sample });
-        }
-    }
 }
 
 fn entry(island: &Island, from: Sample, nearest: &Nearest) -> LedgerEntry {

@@ -3,9 +3,9 @@
 //! | step | file | what happens |
 //! |--:|---|---|
 //! | 1 | `adjacency`, `graph` | 26-neighbours; junction clusters become one hub, chains become pieces |
-//! | 2 | `components`, `bridges` | the largest component is the tree; short gaps to islands are bridged |
+//! | 2 | `components`, `bridges`, `nearest` | the largest component is the tree; short gaps to islands are bridged |
 //! | 3 | `loops` | every loop is opened at its thinnest place |
-//! | 4 | `living`, `prune`, `redundant`, `root` | spurs go, the root is chosen |
+//! | 4 | `living`, `prune`, `redundant`, `lumen`, `root` | spurs go, the root is chosen |
 //! | 5 | `outline` | lines between root, forks and tips |
 //! | 6 | `forks` | forks move to where the branches' axes meet |
 //! | 7 | `tips` | free ends are set where the organ ends |
@@ -46,8 +46,10 @@ mod forks;
 mod graph;
 mod living;
 mod loops;
+mod lumen;
 mod mask_walk;
 mod merge;
+mod nearest;
 mod outline;
 mod ownership;
 mod params;
@@ -109,7 +111,7 @@ pub fn build(
     loops::open(&mut graph, params, &mut ledger)?;
     let mut living = living::Living::new(&graph);
     let protection = root::protected_tips(&mut living, params);
-    prune::prune(&mut living, &protection, params, &mut ledger);
+    prune::prune(&mut living, &protection, (mask, params), &mut ledger);
     let choice = root::choose(&living, params);
     root::describe(&choice, &living, params, (&mut ledger, &mut report));
 

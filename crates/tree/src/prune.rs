@@ -15,7 +15,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use espalier_model::{Ledger, LedgerEntry, LedgerKind};
+use espalier_model::{Ledger, LedgerEntry, LedgerKind, Mask};
 
 use crate::graph::Sample;
 use crate::living::Living;
@@ -28,11 +28,11 @@ const STUB_FACTOR: f64 = 2.0;
 /// A branch of at most this multiple of the limit may be a spur that winds.
 const WINDING: f64 = 2.0;
 
-/// Prunes all spurs and redundant branches whose tips are not protected; returns how many there were.
+/// Prunes all spurs and redundant branches whose tips are not protected; returns how many there were. The mask tells walls.
 pub(crate) fn prune(
     living: &mut Living<'_>,
     protection: &[Protection],
-    params: &Params,
+    (mask, params): (&Mask, &Params),
     ledger: &mut Ledger,
 ) -> usize {
     if params.prune_factor <= 0.0 && params.prune_min_mm <= 0.0 {
@@ -57,7 +57,7 @@ pub(crate) fn prune(
             continue;
         }
         let Some(reason) =
-            reason_to_prune(living, (tip, fork), run.length_mm, protection[tip], (&spheres, params))
+            reason_to_prune(living, (tip, fork), run.length_mm, protection[tip], (&spheres, mask, params))
         else {
             continue;
         };
@@ -83,7 +83,7 @@ fn reason_to_prune(
     (tip, fork): (usize, usize),
     length_mm: f64,
     protection: Protection,
-    (spheres, params): (&Spheres, &Params),
+    (spheres, mask, params): (&Spheres, &Mask, &Params),
 ) -> Option<String> {
     let fork_radius_mm = living.graph.hubs[fork].sample.radius_mm;
     let stub_factor = if living.graph.hubs[tip].is_stub { STUB_FACTOR } else { 1.0 };
@@ -93,14 +93,18 @@ fn reason_to_prune(
             "terminal branch of {length_mm:.3} mm at a fork of radius {fork_radius_mm:.3} mm; the limit there is {limit_mm:.3} mm"
         ));
     }
-    let redundant = spheres.redundant_at(living, tip)?;
+    let redundant = spheres.redundant_at(living, tip, mask)?;
     if redundant.n_beyond == 0 {
         return Some(format!(
             "terminal branch of {length_mm:.3} mm inside of its fork's radius of {fork_radius_mm:.3} mm, its tip in the sphere of a twin at the border of the scan"
         ));
     }
+    let beside = match redundant.n_beside {
+        0 => String::new(),
+        n_beside => format!(", {n_beside} beside them with no wall between"),
+    };
     Some(format!(
-        "terminal branch of {length_mm:.3} mm in the lumen of others: beyond its fork's radius of {fork_radius_mm:.3} mm, {} of {} places are inside their spheres",
+        "terminal branch of {length_mm:.3} mm in the lumen of others: beyond its fork's radius of {fork_radius_mm:.3} mm, {} of {} places are inside their spheres{beside}",
         redundant.n_inside, redundant.n_beyond
     ))
 }

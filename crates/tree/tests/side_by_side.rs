@@ -3,9 +3,9 @@
 
 mod common;
 
-use common::{Places, tree_of};
+use common::{Places, inputs, tree_of};
 use espalier_model::{LedgerKind, Tree};
-use espalier_tree::{Built, Params};
+use espalier_tree::{Built, Params, build};
 use glam::DVec3;
 
 /// A chain of straight runs of voxels of one radius.
@@ -104,6 +104,50 @@ fn long_stub_in_the_lumen_of_its_trunk_goes_and_one_beside_it_stays() {
         assert_eq!(pruned.len(), usize::from(n_branches == 1), "{pruned:?}");
         assert!(pruned.iter().all(|e| e.reason.contains("in the lumen of others") && e.length_mm > 30.0));
     }
+}
+
+/// Two lines of radius 5 along y, `apart` voxels from each other, one a stub that leaves the other near its end. The mask is
+/// the spheres, and what `is_filled` or `is_cleared` says of the voxels (x from the first line on, y).
+fn two_lines(
+    apart: i64,
+    is_filled: impl Fn(i64, i64) -> bool,
+    is_cleared: impl Fn(i64, i64) -> bool,
+) -> Built {
+    let mut places = chain(&[[20, 6, 9], [20, 80, 9]], 5.0);
+    places.extend(chain(&[[20, 70, 9], [20 + apart, 70 - apart, 9], [20 + apart, 8, 9]], 5.0));
+    let shape = [60, 90, 19];
+    let (mut mask, skeleton, spheres) = inputs(&places, shape);
+    for [x, y, z] in (0..60 * 90 * 19).map(|i| [i % 60, i / 60 % 90, i / 5400]) {
+        let (across, along) = (x as i64 - 20, y as i64);
+        if is_filled(across, along) && (z as i64 - 9).abs() <= 5 {
+            mask.bits_mut().set([x, y, z]);
+        }
+        if is_cleared(across, along) {
+            mask.bits_mut().clear([x, y, z]);
+        }
+    }
+    build(&mask, &skeleton, &spheres, &Params::default()).expect("a tree")
+}
+
+#[test]
+fn a_line_beside_another_in_a_flat_lumen_goes() {
+    // More than both radii apart, so that neither is in the other's spheres.
+    let is_between = |across: i64, along: i64| (-5..=17).contains(&across) && (2..=85).contains(&along);
+    let built = two_lines(12, is_between, |_, _| false);
+    assert_eq!(built.tree.branches().list().len(), 1);
+    let pruned = built.ledger.0.iter().find(|entry| entry.kind == LedgerKind::SpurPruned).expect("the stub");
+    assert!(pruned.reason.contains("beside them with no wall between"), "{}", pruned.reason);
+}
+
+#[test]
+fn vessels_side_by_side_stay_where_a_wall_or_a_waist_parts_them() {
+    let is_between = |across: i64, along: i64| (-5..=17).contains(&across) && (2..=85).contains(&along);
+    // A wall of one voxel, below the place where they part.
+    let walled = two_lines(12, is_between, |across, along| across == 6 && along < 56);
+    assert_eq!(walled.tree.branches().list().len(), 3, "a wall");
+    // Two round tubes that touch: between them the body is as wide as they overlap.
+    let waist = two_lines(8, |_, _| false, |_, _| false);
+    assert_eq!(waist.tree.branches().list().len(), 3, "a waist");
 }
 
 #[test]

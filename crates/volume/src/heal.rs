@@ -19,7 +19,7 @@
 mod blur;
 mod pits;
 
-use espalier_model::{Bits, Grid, LedgerEntry, LedgerKind};
+use espalier_model::{Bits, EULER_OF_BLOCK, Grid, LedgerEntry, LedgerKind};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -28,36 +28,6 @@ use blur::blur;
 
 /// The most patches that the ledger lists one by one.
 const MAX_LISTED: usize = 2000;
-
-/// 8 χ of each of the 256 sets of a 2×2×2 block of voxels about a vertex; voxel (x, y, z) of the block is bit
-/// 4z + 2y + x. The vertex owns itself, half of each of its 6 edges, a quarter of each of its 12 faces and an eighth
-/// of each of its 8 voxels.
-const EULER_OF_BLOCK: [i8; 256] = {
-    let mut table = [0; 256];
-    let mut block: usize = 0;
-    while block < 256 {
-        let axis_masks = [0b1010_1010_usize, 0b1100_1100, 0b1111_0000];
-        let mut euler = if block == 0 { 0 } else { 8 };
-        let mut side = 0;
-        while side < 6 {
-            let half = if side % 2 == 0 { axis_masks[side / 2] } else { !axis_masks[side / 2] & 255 };
-            // An edge of the vertex is touched by the four voxels on its side.
-            euler -= if block & half != 0 { 4 } else { 0 };
-            let mut other = side / 2 * 2 + 2;
-            while other < 6 {
-                let half_too =
-                    if other % 2 == 0 { axis_masks[other / 2] } else { !axis_masks[other / 2] & 255 };
-                // A face by the two voxels on both sides.
-                euler += if block & half & half_too != 0 { 2 } else { 0 };
-                other += 1;
-            }
-            side += 1;
-        }
-        table[block] = (euler - block.count_ones() as i32) as i8;
-        block += 1;
-    }
-    table
-};
 
 /// What was done to a mask.
 #[derive(Default)]
@@ -82,7 +52,7 @@ impl Healed {
 pub(crate) fn heal(mask: &mut Bits, grid: &Grid) -> Healed {
     let mut smooth = blur(mask);
     keep_branches(mask, &mut smooth);
-    pits::fill(mask, &mut smooth);
+    pits::fill(mask, pits::coarse_axis(grid.spacing_mm().to_array()), &mut smooth);
     let patches = Patches::between(mask, &smooth);
     let mut is_taken = patches.raise_euler_number(mask);
     patches.leave_apart(mask, &mut is_taken);
@@ -290,18 +260,6 @@ mod tests {
 
     fn grid(bits: &Bits) -> Grid {
         Grid::axis_aligned(bits.shape(), DVec3::ONE, DVec3::ZERO).expect("legal")
-    }
-
-    #[test]
-    fn blocks_add_up_to_the_euler_number() {
-        for case in 0..50 {
-            let bits = random_bits(case);
-            let [nx, ny, nz] = bits.shape().map(|extent| extent as i64);
-            let vertices =
-                (0..=nz).flat_map(|z| (0..=ny).flat_map(move |y| (0..=nx).map(move |x| [x, y, z])));
-            let eight: i64 = vertices.map(|v| i64::from(EULER_OF_BLOCK[block(&bits, v)])).sum();
-            assert_eq!(eight, 8 * euler_number(&bits), "case {case}");
-        }
     }
 
     #[test]

@@ -3,9 +3,11 @@
 //! | the volume holds | between its voxels |
 //! |---|---|
 //! | two values: a mask | the nearer of the two to the linear interpolation; of equal ones the larger |
-//! | several whole numbers from 0 on, as [`Kind::Labels`] says: a label map | the nearest voxel's |
+//! | several whole numbers from 0 on, as [`Kind::Labels`] says, of which nothing tells that they are intensities: a label map | the nearest voxel's |
 //! | anything else: a scan | linear interpolation, rounded where the numbers are whole |
 //!
+//! **What tells intensities?** A scanner's modality in a DICOM series; that the numbers are to be rescaled, which no label is;
+//! that the caller chooses voxels by a band. Values alone do not: of 8 bits a scan has no more than a label map may have.
 //! **Why by the values and not by their type?** A CT is whole numbers too; the nearest voxel would move its walls by up
 //! to half a voxel, and between two labels linear interpolation would find a third.
 //! **Input** stored numbers and their scaling, and where each new voxel lies among the old ones. **Output** the numbers
@@ -83,8 +85,8 @@ pub(crate) struct Between<T> {
 }
 
 impl<T: Number> Between<T> {
-    /// By the volume's values, `slope · stored + intercept`.
-    pub(crate) fn of(values: &[T], (slope, intercept): (f64, f64)) -> Self {
+    /// By the volume's values, `slope · stored + intercept`, and by whether it is known to hold intensities.
+    pub(crate) fn of(values: &[T], (slope, intercept): (f64, f64), is_scan: bool) -> Self {
         let (mut scaled, mut stored) = (Census::default(), Census::default());
         for &value in values {
             scaled.see(slope * value.to_f64() + intercept);
@@ -92,6 +94,7 @@ impl<T: Number> Between<T> {
         }
         let policy = match scaled.kind() {
             Kind::Mask { .. } => Policy::Mask { low: stored.min, high: stored.max },
+            _ if is_scan || (slope, intercept) != (1.0, 0.0) => Policy::Scan,
             Kind::Labels { .. } | Kind::Constant { .. } => Policy::Labels,
             Kind::Ct { .. } => Policy::Scan,
         };
@@ -125,6 +128,8 @@ pub(crate) struct Lookup {
     pub(crate) old_shape: [usize; 3],
     pub(crate) new_shape: [usize; 3],
     pub(crate) old_from_new: DAffine3,
+    /// Whether the volume is known to hold intensities.
+    pub(crate) is_scan: bool,
 }
 
 impl Lookup {
@@ -135,7 +140,7 @@ impl Lookup {
         scaling: (f64, f64),
     ) -> (Array3<T>, &'static str) {
         // A volume's array is in standard layout, so there is a slice.
-        let between = Between::of(old.as_slice().unwrap_or_default(), scaling);
+        let between = Between::of(old.as_slice().unwrap_or_default(), scaling, self.is_scan);
         let new = self.map(|point| {
             let Some([x, y, z]) = self.inside((point + 0.5).floor()) else { return between.fill };
             match between.policy {
@@ -228,11 +233,26 @@ mod tests {
     use super::*;
 
     fn at_halves<T: Number>(values: &[T]) -> Vec<f64> {
+        resampled(values, (1.0, 0.0), false)
+    }
+
+    fn resampled<T: Number>(values: &[T], scaling: (f64, f64), is_scan: bool) -> Vec<f64> {
         let old = Array3::from_shape_vec((1, 1, values.len()), values.to_vec()).expect("a row");
         let old_from_new = DAffine3::from_scale(DVec3::new(0.5, 1.0, 1.0));
         let new_shape = [2 * values.len() + 1, 1, 1];
-        let lookup = Lookup { old_shape: [values.len(), 1, 1], new_shape, old_from_new };
-        lookup.resample(&old, (1.0, 0.0)).0.iter().map(|value| value.to_f64()).collect()
+        let lookup = Lookup { old_shape: [values.len(), 1, 1], new_shape, old_from_new, is_scan };
+        lookup.resample(&old, scaling).0.iter().map(|value| value.to_f64()).collect()
+    }
+
+    #[test]
+    fn few_whole_numbers_are_no_labels_where_they_are_known_to_be_intensities() {
+        let values = [1_u8, 3, 9];
+        let blended = [1.0, 2.0, 3.0, 6.0, 9.0, 1.0, 1.0];
+        assert_eq!(resampled(&values, (1.0, 0.0), true), blended);
+        assert_eq!(resampled(&values, (4.0, -1024.0), false), blended);
+        assert_eq!(resampled(&values, (1.0, 0.0), false), [1.0, 3.0, 3.0, 9.0, 9.0, 1.0, 1.0]);
+        // Of two values nothing stands between, whatever they are.
+        assert_eq!(resampled(&[0_u8, 7], (1.0, 0.0), true), [0.0, 7.0, 7.0, 0.0, 0.0]);
     }
 
     #[test]

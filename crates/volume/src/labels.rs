@@ -65,23 +65,26 @@ impl Labels {
 
     /// The labels with a value in place of each name, by names that the user gave; and a sentence for each name. A name
     /// is looked for as it is written, then with capitals, spaces, hyphens and underscores all one; where several values
-    /// have it, it stands for all of them.
+    /// have it, it stands for all of them. What commas part may be one name with commas in it: of labels in a row the
+    /// most that are a name together are taken for it.
     ///
     /// # Errors
     /// [`Error::NotNamed`] for a name that is not among them, with those that are nearest.
     pub fn by_names(&self, names: &BTreeMap<i64, String>) -> Result<(Self, Vec<String>), Error> {
         let (mut labels, mut notes) = (Vec::new(), Vec::new());
-        for label in &self.0 {
-            let Label::Name(name) = label else {
+        let mut left = &self.0[..];
+        while let Some(label) = left.first() {
+            let (n_joined, name, values) = joined(left, names);
+            left = &left[n_joined..];
+            if n_joined == 1 && matches!(label, Label::Value(_)) {
                 labels.push(label.clone());
                 continue;
-            };
-            let values = values_of(name, names);
+            }
             if values.is_empty() {
                 let mut known: Vec<&str> = names.values().map(String::as_str).collect();
                 known.dedup();
-                let nearest = listed(nearest_of(name, known.into_iter()).into_iter());
-                return Err(Error::NotNamed { name: name.clone(), n_names: names.len(), nearest });
+                let nearest = listed(nearest_of(&name, known.into_iter()).into_iter());
+                return Err(Error::NotNamed { name, n_names: names.len(), nearest });
             }
             notes.push(format!("label {name} taken for {}", listed(values.iter().map(i64::to_string))));
             labels.extend(values.into_iter().map(|value| Label::Value(value as f64)));
@@ -155,6 +158,18 @@ fn named(value: f64, present: &[f64]) -> String {
     name.map_or_else(|| value.to_string(), |name| format!("{value} ({name})"))
 }
 
+/// How many of the first labels are a name together, that name, and its values; the first alone if none are.
+fn joined(labels: &[Label], names: &BTreeMap<i64, String>) -> (usize, String, Vec<i64>) {
+    let most = names.values().map(|name| name.matches(',').count() + 1).max().unwrap_or(1);
+    let together = |n: usize| {
+        let name = Labels(labels[..n].to_vec()).to_string();
+        let values = values_of(&name, names);
+        (n, name, values)
+    };
+    let several = (2..=most.min(labels.len())).rev().map(together).find(|(.., values)| !values.is_empty());
+    several.unwrap_or_else(|| together(1))
+}
+
 /// The values that have a name.
 fn values_of(name: &str, names: &BTreeMap<i64, String>) -> Vec<i64> {
     let of = |is_same: &dyn Fn(&str) -> bool| -> Vec<i64> {
@@ -164,9 +179,9 @@ fn values_of(name: &str, names: &BTreeMap<i64, String>) -> Vec<i64> {
     if exact.is_empty() { of(&|known| folded(known) == folded(name)) } else { exact }
 }
 
-/// A name with its words in lower case, parted by single spaces.
+/// A name with its words in lower case, parted by single spaces; commas part words, too.
 fn folded(name: &str) -> String {
-    let is_gap = |letter: char| letter.is_whitespace() || letter == '_' || letter == '-';
+    let is_gap = |letter: char| letter.is_whitespace() || matches!(letter, '_' | '-' | ',');
     let words: Vec<&str> = name.split(is_gap).filter(|word| !word.is_empty()).collect();
     words.join(" ").to_lowercase()
 }
@@ -323,6 +338,18 @@ mod tests {
         );
         // Of a file of the user's own, no other names count.
         assert!(values("trachea").is_err());
+    }
+
+    #[test]
+    fn names_may_have_commas() {
+        let names = ["lung, left", "lung", "lobe 3, 5, upper", "left"];
+        let names: BTreeMap<i64, String> = (1..).zip(names.map(str::to_owned)).collect();
+        let values = |text: &str| Labels::parse(text).by_names(&names).map(|(labels, _)| labels.values());
+        assert_eq!(values("lung, left").expect("one name"), Some(vec![1.0]));
+        assert_eq!(values("LUNG,left, lung").expect("two"), Some(vec![1.0, 2.0]));
+        assert_eq!(values("left, lung").expect("two"), Some(vec![4.0, 2.0]));
+        assert_eq!(values("7, lobe 3, 5, upper, 5").expect("a value within"), Some(vec![7.0, 3.0, 5.0]));
+        assert!(values("lung, right").is_err());
     }
 
     #[test]

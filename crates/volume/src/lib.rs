@@ -89,7 +89,6 @@ mod spacing;
 pub use crop::{Cropped, read_box};
 pub use dicom::{DicomError, Irregularity, Listed, Obstacle, is_dicom_folder};
 pub use error::Error;
-pub use euler::euler_number;
 pub use growth::{GROWTH_COLUMNS, Growth, Knee, Level, Towards};
 pub use kind::{Kind, check_regions, inspect_kind};
 pub use labels::{Label, Labels};

@@ -28,7 +28,7 @@ pub(crate) fn resample(
     let (shape, world_from_voxel) = (stored.shape, stored.world_from_voxel);
     let grid = orthogonal_grid(shape, world_from_voxel, max_bytes, bytes_per_voxel(voxels))?;
     let old_from_new = world_from_voxel.inverse() * grid.world_from_voxel();
-    let lookup = Lookup { old_shape: shape, new_shape: grid.shape(), old_from_new };
+    let lookup = Lookup { old_shape: shape, new_shape: grid.shape(), old_from_new, is_scan: false };
     let (resampled, how) = resample_voxels!(lookup, voxels, (stored.slope, stored.intercept));
     let [[ox, oy, oz], [nx, ny, nz]] = [shape, grid.shape()];
     report.warn(

@@ -39,6 +39,7 @@ pub(crate) fn scan(
             DMat3::from_diagonal(DVec3::new(x.ratio, y.ratio, z.ratio)),
             DVec3::new(x.at(0), y.at(0), z.at(0)),
         ),
+        is_scan: true,
     };
     let scaling = volume.scaling();
     let (voxels, how) = resample_voxels!(lookup, volume.voxels(), scaling);

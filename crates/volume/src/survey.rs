@@ -10,12 +10,13 @@ use std::path::Path;
 
 use espalier_model::{Bits, Grid, Report, Volume, Voxels};
 
+use crate::euler::euler_number;
 use crate::kind::Census;
 use crate::read::{check_limit, count_grid, orthogonal_grid};
 use crate::runs::{Connectivity, Runs};
 use crate::scalar::Scalar;
 use crate::stored::Stored;
-use crate::{Error, Kind, ReadOptions, dicom, euler_number, read, stream};
+use crate::{Error, Kind, ReadOptions, dicom, read, stream};
 
 /// What a volume file is.
 #[derive(Clone, Debug, PartialEq)]

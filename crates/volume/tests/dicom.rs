@@ -163,6 +163,26 @@ fn gaps_and_uneven_distances() {
     assert_eq!(code_of(&stack(&[0.0])), "E-DICOM-SINGLE");
 }
 
+/// Few values, none below 0 and no rescaling, as scans of 8 bits have: what lies between slices is told by the modality.
+#[test]
+fn few_values_of_a_scanner_are_no_labels() {
+    let slices = |modality: &'static str| -> Vec<Slice> {
+        let slice = |i: u32| {
+            let mut slice = Slice::at([0.0, 2.0, 4.0, 8.0][i as usize]);
+            (slice.modality, slice.intercept) = (modality, 0.0);
+            slice.values = vec![10 * i as i16; 30];
+            slice
+        };
+        (0..4).map(slice).collect()
+    };
+    let middle = |modality| {
+        let volume = read_slices(&slices(modality), &RESAMPLE).expect("resampled").volume;
+        volume.value(volume.grid().index([2, 2, 3]))
+    };
+    assert_eq!((middle("CT"), middle("MR")), (25.0, 25.0));
+    assert!([20.0, 30.0].contains(&middle("SEG")) && [20.0, 30.0].contains(&middle("OT")));
+}
+
 /// A tilted gantry: where the value tells the place, resampling must put it there.
 #[test]
 fn tilt_is_refused_or_resampled() {

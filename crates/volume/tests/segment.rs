@@ -119,6 +119,16 @@ fn main_components() {
     assert_eq!(lungs.ledger.0.iter().map(|entry| entry.reason.as_str()).collect::<Vec<_>>(), [reason; 2]);
     assert_eq!(lungs.report.get("components_dropped"), Some(2.0));
     check(&text, &Params { label: Some(7.0.into()), ..Params::default() }, &two);
+    // Two voxels of 45 are worth a word, one of 60 is not.
+    let words = |segmented: &Segmented| -> Vec<String> {
+        let told = segmented.report.warnings.iter().filter(|warning| warning.code == "W-VOLUME-DROPPED");
+        told.map(|warning| warning.message.clone()).collect()
+    };
+    let expected =
+        "2 small components of the mask were dropped, together 0.020 ml, 4.4 % of it, the largest 0.010 ml";
+    assert!(words(&lungs)[0].starts_with(expected), "{:?}", words(&lungs));
+    let noise = check(&format!("{}.7", "7".repeat(59)), &Params::default(), &format!("{}..", "#".repeat(59)));
+    assert_eq!((noise.report.get("components_dropped"), words(&noise).len()), (Some(1.0), 0));
     let band = Params { method: Method::Threshold, lower: Some(5.0), ..Params::default() };
     let alone = check(&text, &band, &format!("{}........", "#".repeat(40)));
     assert_eq!(alone.report.get("components_dropped"), Some(3.0));

@@ -5,7 +5,10 @@ use espalier_model::Tree;
 use espalier_tests::ground_truth::{false_tips, phantoms::Measured};
 use glam::DVec3;
 
-/// One line a tip: place, radius, length and fork's radius of its branch, and how far it lies out of the true body.
+use crate::lost_tips::nearest_entry;
+
+/// One line a tip: place, radius, length and fork's radius of its branch, how far it lies out of the true body, and the
+/// nearest line of the tree's ledger.
 pub(crate) fn print(measured: &Measured) {
     let (truth, found) = (&measured.truth, &measured.built.tree);
     let branches = found.branches();
@@ -14,14 +17,15 @@ pub(crate) fn print(measured: &Measured) {
         let branch = branches.of_node(tip).unwrap_or(0);
         println!(
             "    false: ({:.1}, {:.1}, {:.1}) radius {:.2} mm, on a branch of {:.1} mm at a fork of radius {:.2} mm, {:+.1} mm out \
-             of the true body",
+             of the true body{}",
             place.x,
             place.y,
             place.z,
             found.nodes()[tip].radius_mm,
             branches.length_mm(found, branch),
             branches.list().get(branch).map_or(0.0, |branch| found.nodes()[branch.hub].radius_mm),
-            outside_mm(truth, place)
+            outside_mm(truth, place),
+            nearest_entry("tree", &measured.built.ledger, place)
         );
     }
 }

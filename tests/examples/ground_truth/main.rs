@@ -1,8 +1,8 @@
 //! Whole phantom trees against their truth: `cargo run --release -p espalier-tests --example ground_truth`
 //!
-//! For each grid, an airway and a vessel tree of the phantom generator, from three masks: the voxels whose centre lies
+//! For each grid, an airway and a vessel tree of the phantom generator, from four masks: the voxels whose centre lies
 //! in the body (`clean`), the same with 15 % of its surface's voxels flipped (`rough`), and what region growing makes of
-//! its noisy CT (`ct`). Columns and tolerances are those of `espalier_tests::ground_truth`. Every tip of the truth
+//! its noisy CT, in a band that is given (`ct`), and by the preset (`preset`), which finds threshold and trachea itself. Columns and tolerances are those of `espalier_tests::ground_truth`. Every tip of the truth
 //! counts; what a grid cannot show is part of the figure.
 //! `--only WORD` takes the rows that hold the word, `--small` one grid, `--seed N` another tree of each kind than that of seed 7;
 //! `--false` lists each tip that is not true, with its branch, `--lost` each tip that was not found, with
@@ -37,7 +37,7 @@ fn main() -> ExitCode {
                 match phantoms::measure(&case) {
                     Ok(measured) => {
                         println!("{measured}");
-                        if case.scan == Scan::Ct {
+                        if case.scan.is_ct() {
                             bands::print(&measured);
                         }
                         if is_lost_listed {

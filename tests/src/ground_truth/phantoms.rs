@@ -3,10 +3,10 @@
 use std::error::Error;
 use std::fmt::{self, Display};
 
-use espalier_model::{Mask, Tree, Volume, Voxels};
+use espalier_model::{Ledger, Mask, Skeleton, Tree, Volume, Voxels};
 use espalier_phantom::{Kind, Params, Phantom};
 use espalier_tree::{Built, Root};
-use espalier_volume::Method;
+use espalier_volume::{Method, Preset};
 use glam::DVec3;
 use ndarray::Array3;
 
@@ -30,13 +30,21 @@ pub enum Scan {
     Clean,
     /// The same with flipped voxels on its surface.
     Rough,
-    /// Region growing in the noisy CT.
+    /// Region growing in the noisy CT, in the band that the phantom's makers know.
     Ct,
+    /// The preset for airways or vessels in the noisy CT: no threshold is given, and of airways no seed.
+    Preset,
 }
 
 impl Scan {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Clean, Self::Rough, Self::Ct];
+    pub const ALL: [Self; 4] = [Self::Clean, Self::Rough, Self::Ct, Self::Preset];
+
+    /// Whether it is a noisy CT.
+    #[must_use]
+    pub fn is_ct(self) -> bool {
+        matches!(self, Self::Ct | Self::Preset)
+    }
 }
 
 /// One row of the table.
@@ -67,6 +75,10 @@ pub struct Measured {
     pub case: Case,
     /// The mask that was thinned.
     pub mask: Mask,
+    /// What the volume stage dropped and mended to get it.
+    pub dropped: Ledger,
+    /// The skeleton of the mask.
+    pub skeleton: Skeleton,
     /// The true tree.
     pub truth: Tree,
     /// The tree found.
@@ -114,31 +126,35 @@ pub fn measure(case: &Case) -> Result<Measured, Box<dyn Error>> {
     let roughness = if case.scan == Scan::Rough { ROUGHNESS } else { 0.0 };
     let params = Params { spacing_mm: case.spacing_mm, size, roughness, ..Params::default() };
     let phantom = espalier_phantom::generate(case.kind, &params, case.seed)?;
-    let mask = mask_of(case, &phantom, &params)?;
-    let built = tree_of(&mask, if case.kind == Kind::Airway { Root::Superior } else { Root::ThickestTip })?;
+    let (mask, dropped) = mask_of(case, &phantom, &params)?;
+    let (skeleton, built) =
+        skeleton_and_tree(&mask, if case.kind == Kind::Airway { Root::Superior } else { Root::ThickestTip })?;
     let score = score(&phantom.tree, &built.tree, spacing);
-    Ok(Measured { case: *case, mask, truth: phantom.tree, built, score })
+    Ok(Measured { case: *case, mask, dropped, skeleton, truth: phantom.tree, built, score })
 }
 
-/// The mask of a case as the volume stage hands it on.
-fn mask_of(case: &Case, phantom: &Phantom, params: &Params) -> Result<Mask, Box<dyn Error>> {
-    if let (Scan::Ct, Some(how)) = (case.scan, phantom.truth.segmentation) {
+/// The mask of a case as the volume stage hands it on, and its part of the ledger.
+fn mask_of(case: &Case, phantom: &Phantom, params: &Params) -> Result<(Mask, Ledger), Box<dyn Error>> {
+    if let (true, Some(how)) = (case.scan.is_ct(), phantom.truth.segmentation) {
         let ct = espalier_phantom::ct(phantom, params, case.seed)?;
+        let (is_band, is_airway) = (case.scan == Scan::Ct, case.kind == Kind::Airway);
         let volume = espalier_volume::Params {
-            method: Method::RegionGrow,
-            lower: Some(how.band_hu[0]),
-            upper: Some(how.band_hu[1]),
-            seed_mm: Some(how.seed_mm.to_array()),
+            method: if is_band { Method::RegionGrow } else { Method::Auto },
+            preset: (!is_band).then_some(if is_airway { Preset::Airway } else { Preset::Vessel }),
+            lower: is_band.then_some(how.band_hu[0]),
+            upper: is_band.then_some(how.band_hu[1]),
+            seed_mm: (is_band || !is_airway).then(|| how.seed_mm.to_array()),
             ..espalier_volume::Params::default()
         };
-        return Ok(espalier_volume::segment(&ct, &volume)?.mask);
+        let segmented = espalier_volume::segment(&ct, &volume)?;
+        return Ok((segmented.mask, segmented.ledger));
     }
     let mask = phantom.mask.as_ref().ok_or("a phantom without a mask")?;
     cleaned(mask)
 }
 
 /// Components and cavities of a mask as the volume stage leaves them.
-fn cleaned(mask: &Mask) -> Result<Mask, Box<dyn Error>> {
+fn cleaned(mask: &Mask) -> Result<(Mask, Ledger), Box<dyn Error>> {
     let [nx, ny, nz] = mask.grid().shape();
     let mut voxels = Array3::zeros((nz, ny, nx));
     for [x, y, z] in mask.voxels() {
@@ -146,7 +162,8 @@ fn cleaned(mask: &Mask) -> Result<Mask, Box<dyn Error>> {
     }
     let volume = Volume::new(mask.grid().clone(), Voxels::U8(voxels), 1.0, 0.0);
     let params = espalier_volume::Params { method: Method::Mask, ..espalier_volume::Params::default() };
-    Ok(espalier_volume::segment(&volume, &params)?.mask)
+    let segmented = espalier_volume::segment(&volume, &params)?;
+    Ok((segmented.mask, segmented.ledger))
 }
 
 /// The tree of a mask with the defaults of all stages.
@@ -154,9 +171,14 @@ fn cleaned(mask: &Mask) -> Result<Mask, Box<dyn Error>> {
 /// # Errors
 /// Those of the stages.
 pub fn tree_of(mask: &Mask, root: Root) -> Result<Built, Box<dyn Error>> {
+    Ok(skeleton_and_tree(mask, root)?.1)
+}
+
+fn skeleton_and_tree(mask: &Mask, root: Root) -> Result<(Skeleton, Built), Box<dyn Error>> {
     let skeleton = espalier_skeleton::skeletonize(mask, &espalier_skeleton::Params::default())?.skeleton;
     let spheres =
         espalier_radius::inscribed_spheres(mask, &skeleton, &espalier_radius::Params::default())?.spheres;
     let params = espalier_tree::Params { root, ..espalier_tree::Params::default() };
-    Ok(espalier_tree::build(mask, &skeleton, &spheres, &params)?)
+    let built = espalier_tree::build(mask, &skeleton, &spheres, &params)?;
+    Ok((skeleton, built))
 }

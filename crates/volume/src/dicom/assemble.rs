@@ -25,6 +25,9 @@ use crate::{ReadError, ReadOptions};
 /// samples in single precision.
 const DECODER_BYTES_PER_PIXEL: u64 = 64;
 
+/// The modalities whose slices hold what was measured; segmentations, and what programs derive, come as SEG, OT or none.
+const SCANNERS: [&str; 10] = ["CT", "MR", "PT", "NM", "US", "XA", "RF", "CR", "DX", "MG"];
+
 /// A volume.
 pub(crate) struct Assembled {
     pub(crate) shape: [usize; 3],
@@ -61,7 +64,7 @@ impl Stored for f32 {
 
 /// Decodes a stack.
 pub(super) fn assemble(
-    stack: &Stack,
+    (stack, modality): (&Stack, &str),
     options: &ReadOptions,
     report: &mut Report,
 ) -> Result<Assembled, ReadError> {
@@ -80,7 +83,7 @@ pub(super) fn assemble(
         })
     };
     let (slope, intercept) = if is_uniform { (first.slope, first.intercept) } else { (1.0, 0.0) };
-    let job = Job { stack, options, scaling: (slope, intercept) };
+    let job = Job { stack, options, scaling: (slope, intercept), is_scan: SCANNERS.contains(&modality) };
     let (shape, lps_from_voxel, voxels) = if !is_uniform {
         report.count_usize("dicom_scalings", count_scalings(stack));
         let (shape, affine, array) = job.run(report)?;
@@ -123,6 +126,8 @@ struct Job<'a> {
     options: &'a ReadOptions,
     /// Slope and intercept of the numbers in the volume.
     scaling: (f64, f64),
+    /// Whether a scanner has measured them.
+    is_scan: bool,
 }
 
 impl Job<'_> {
@@ -151,7 +156,7 @@ impl Job<'_> {
         };
         let mut new = allocate::<T>(plan.shape)?;
         let irregularity = &self.stack.irregularity;
-        resample::resample((&voxels, self.scaling), (&plan, irregularity), &mut new, report);
+        resample::resample((&voxels, self.scaling, self.is_scan), (&plan, irregularity), &mut new, report);
         let shape = plan.shape;
         Ok((shape, plan.lps_from_voxel, as_array(new, shape)?))
     }

@@ -55,7 +55,7 @@ pub fn is_dicom_folder(path: &Path) -> bool {
 pub(crate) fn read(path: &Path, options: &ReadOptions, report: &mut Report) -> Result<Assembled, ReadError> {
     let (stack, modality) = stack(path, options, report)?;
     warn_of_intensities(&stack, &modality, report);
-    assemble::assemble(&stack, options, report)
+    assemble::assemble((&stack, &modality), options, report)
 }
 
 /// The files of the series that `path` means, by position.

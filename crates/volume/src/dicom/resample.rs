@@ -5,7 +5,7 @@
 //! slices keep or undercut, stretched so that the first and the last plane lie on the first and the last slice;
 //! aside, room for every slice; 2. each plane between the two slices around it: linear along the normal, bilinear
 //! within each slice, since the slices lie aside of each other; masks and labels by the policy of
-//! [`interpolate`](crate::interpolate); 3. outside the slices the smallest value of all, which is air in a CT.
+//! [`interpolate`](crate::interpolate), where the modality says whether they may be labels; 3. outside the slices the smallest value of all, which is air in a CT.
 //! **Guarantees** a value stands where the headers say it was measured, in mm; on a slice that needs no shift by
 //! parts of a pixel the values are the slice's own.
 //! **Cost** O(new voxels), in parallel over planes.
@@ -82,15 +82,15 @@ impl Plan {
     }
 }
 
-/// Fills `new`, which has the plan's shape, from numbers and their scaling.
+/// Fills `new`, which has the plan's shape, from numbers, their scaling, and whether they are known to be intensities.
 pub(super) fn resample<T: Number>(
-    (old, scaling): (&[T], (f64, f64)),
+    (old, scaling, is_scan): (&[T], (f64, f64), bool),
     (plan, irregularity): (&Plan, &Irregularity),
     new: &mut [T],
     report: &mut Report,
 ) {
     let [nx, ny, nz] = plan.shape;
-    let sampler = Sampler { old, plan, between: Between::of(old, scaling) };
+    let sampler = Sampler { old, plan, between: Between::of(old, scaling, is_scan) };
     let planes = new.par_chunks_mut(nx * ny).enumerate();
     let n_outside: usize = planes.map(|(z, plane)| sampler.fill_plane(z, plane)).sum();
     let n_between = (0..nz).filter(|&z| !plan.is_on_slice(z)).count();
