@@ -9,7 +9,7 @@
 //! beyond its fork's sphere, look in the 27 cubes about it for a sphere of another run that contains it. 3. In a flat
 //! lumen lines may run beside each other with none in the other's spheres: so look for the nearest sample of another run
 //! whose sphere nearly touches; it is in one lumen with that if the way between them leads aside ([`MAX_COSINE`]) and
-//! the lumen is wide all along (see [`lumen`](crate::lumen)). A branch that leaves its parent leads away from it,
+//! the lumen is wide all along (see [`lumen`]). A branch that leaves its parent leads away from it,
 //! and two vessels side by side have a wall or a waist between them. 4. Stop as soon as too many are outside.
 //! **Guarantees** a branch all of which lies inside of its fork's sphere is called redundant here only if it has a twin:
 //! another that the scan cuts off there, and whose tip's sphere has this tip inside. Alone it may be what a scan left of a
