@@ -116,15 +116,9 @@ impl Stage {
     pub(crate) fn version(self) -> u32 {
         match self {
             Self::Phantom | Self::Views => 1,
-<<<<<<< HEAD
-            Self::Skeleton | Self::Radius | Self::Tree => 2,
-            Self::Volume | Self::Render | Self::Report => 3,
-            Self::Embed => 4,
-=======
             Self::Radius => 2,
-            Self::Skeleton | Self::Tree | Self::Embed | Self::Render | Self::Report => 3,
-            Self::Volume => 4,
->>>>>>> e8aaad0 (scan to tree: flat lumina, thick slices, one Euler number; nearest by k-d tree)
+            Self::Skeleton | Self::Tree | Self::Render | Self::Report => 3,
+            Self::Volume | Self::Embed => 4,
         }
     }
 
