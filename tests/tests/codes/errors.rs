@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use espalier_model::diagnose::Class;
 use syn::{Expr, ImplItem, Item, Pat, Stmt};
 
-use crate::sources::{Sources, Variant};
+use crate::sources::{Source, Sources, Variant};
 
 /// Code → exit codes.
 pub(crate) fn exit_codes(sources: &Sources) -> BTreeMap<String, BTreeSet<u8>> {
@@ -56,15 +56,22 @@ struct Found {
 }
 
 fn errors(sources: &Sources) -> Vec<Found> {
+    let parse = |source: &Source| syn::parse_file(&source.text).expect("Rust").items;
+    let files: Vec<(&Source, Vec<Item>)> =
+        sources.program.iter().map(|source| (source, parse(source))).collect();
     let mut found = Vec::new();
-    for source in &sources.program {
-        let file = syn::parse_file(&source.text).expect("Rust");
-        for item in &file.items {
+    for (source, items) in &files {
+        for item in items {
             let Item::Impl(implementation) = item else { continue };
             let Some(of) = type_name(&implementation.self_ty) else { continue };
             let Some(code) = body(&implementation.items, "code") else { continue };
             let class = body(&implementation.items, "class");
-            for (name, holds) in variants_of(&file.items, &of) {
+            // The kinds of an error may stand in a file of their own: that of the module.
+            let module = source.path.with_file_name("mod.rs");
+            let of_module = files.iter().find(|(other, _)| other.path == module).map(|(_, items)| items);
+            let declares = |items: &&Vec<Item>| items.iter().any(|item| is_enum(item, &of));
+            let declared = [Some(items), of_module].into_iter().flatten().find(declares).unwrap_or(items);
+            for (name, holds) in variants_of(declared, &of) {
                 let (codes, asks_for_code) = outcomes(code, &name, &literal);
                 let classes = class.map(|class| outcomes(class, &name, &class_name).0).unwrap_or_default();
                 let variant = Variant { crate_name: source.crate_name.clone(), of: of.clone(), name };
@@ -82,13 +89,17 @@ fn exit_code(class: &str) -> u8 {
 
 /// The variants of an enum with the types in their fields; of a struct one with its own name.
 fn variants_of(items: &[Item], of: &str) -> Vec<(String, Vec<String>)> {
-    let enums = items.iter().find_map(|item| match item {
-        Item::Enum(item) if item.ident == of => Some(item),
+    let enums = items.iter().find(|item| is_enum(item, of)).and_then(|item| match item {
+        Item::Enum(item) => Some(item),
         _ => None,
     });
     let Some(found) = enums else { return vec![(of.to_owned(), Vec::new())] };
     let held = |variant: &syn::Variant| variant.fields.iter().flat_map(|field| names_in(&field.ty)).collect();
     found.variants.iter().map(|variant| (variant.ident.to_string(), held(variant))).collect()
+}
+
+fn is_enum(item: &Item, name: &str) -> bool {
+    matches!(item, Item::Enum(item) if item.ident == name)
 }
 
 fn type_name(of: &syn::Type) -> Option<String> {

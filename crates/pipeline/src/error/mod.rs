@@ -1,9 +1,20 @@
 //! What can go wrong in a run.
+//!
+//! | file | what it says of an error |
+//! |---|---|
+//! | this file | its kinds, each with what it knows, and the sentence that is shown |
+//! | `codes` | its code and its class, hence the exit code |
+//! | `hints` | the way out |
+//! | `places` | the file and the line that are wrong |
+
+mod codes;
+mod hints;
+mod places;
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-use espalier_model::diagnose::{Class, Diagnose, ParamError};
+use espalier_model::diagnose::{Diagnose, ParamError};
 use thiserror::Error;
 
 use crate::config::ConfigError;
@@ -433,228 +444,5 @@ impl Error {
 
     pub(crate) fn file(path: &Path, cause: impl Diagnose + Send + Sync + 'static) -> Self {
         Self::File { path: path.to_owned(), cause: Box::new(cause) }
-    }
-}
-
-impl Diagnose for Error {
-    fn code(&self) -> &'static str {
-        match self {
-            Self::Config(error) => error.code(),
-            Self::Stage { cause, .. } | Self::File { cause, .. } => cause.code(),
-            Self::MissingArtifact { .. } => "E-RUN-MISSING-FILE",
-            Self::NoSuchPlace { .. } => "E-PROFILE-PLACE",
-            Self::PlotFormat { .. } | Self::ResultInTheWay { .. } => "E-PROFILE-PLOT",
-            Self::InputInTheWay { .. } => "E-RUN-INPUT-IN-WAY",
-            Self::FileInTheWay { .. } | Self::FolderInTheWay { .. } => "E-RUN-IN-WAY",
-            Self::Point { cause, .. } => cause.code(),
-            Self::NoSuchSpace { .. } => "E-LOCATE-SPACE",
-            Self::NoRun { .. } => "E-COMPARE-NO-RUN",
-            Self::Samples { .. } => "E-COHORT-TABLE",
-            Self::NoSample { .. } => "E-COHORT-NO-SCAN",
-            Self::Cohort { .. } => "E-COHORT-FAILED",
-            Self::BidsDataset { .. } => "E-BIDS-DATASET",
-            Self::BidsOutput { .. } => "E-BIDS-OUTPUT",
-            Self::BidsSuffix { .. } => "E-BIDS-SUFFIX",
-            Self::NoBidsScan { .. } => "E-BIDS-NO-SCAN",
-            Self::NoBidsLabel { .. } => "E-BIDS-LABEL",
-            Self::NoGroup { .. } => "E-GROUP-NO-RUN",
-            Self::GroupSize { .. } => "E-GROUP-SIZE",
-            Self::RunInTheWay { .. } => "E-COMPARE-FOLDER",
-            Self::Settled { .. } => "E-COMPARE-SETTINGS",
-            Self::SettledTree { .. } => "E-JUXTAPOSE-SETTINGS",
-            Self::NoTree { .. } => "E-JUXTAPOSE-NO-TREE",
-            Self::NotSwept { .. } | Self::SweepSize { .. } => "E-SWEEP",
-            Self::Altered { .. } => "E-RUN-ALTERED-FILE",
-            Self::Certificate { .. } => "E-RUN-CERTIFICATE",
-            Self::Unverified { .. } => "E-VERIFY",
-            Self::NoSuchStage { .. } | Self::EmptyRange { .. } => "E-RUN-STAGES",
-            Self::Input { .. } => "E-INPUT",
-            Self::OtherSettings { .. } => "E-RUN-SETTINGS",
-            Self::OtherInput { .. } => "E-RUN-INPUT",
-            Self::Read { .. } => "E-IO-READ",
-            Self::TooLarge { .. } | Self::Memory { .. } => "E-LIMIT-MEMORY",
-            Self::Create { .. } => "E-IO-CREATE",
-            Self::Write { .. } => "E-IO-WRITE",
-            Self::Print { .. } => "E-IO-PRINT",
-            Self::Locked { .. } => "E-RUN-LOCKED",
-            Self::Threads { .. } => "E-RUN-THREADS",
-            Self::UnknownCode { .. } => "E-EXPLAIN-CODE",
-            Self::UnknownKey { .. } => "E-EXPLAIN-KEY",
-        }
-    }
-
-    fn class(&self) -> Class {
-        match self {
-            Self::Config(error) => error.class(),
-            Self::Stage { cause, .. } | Self::File { cause, .. } => cause.class(),
-            Self::Point { cause, .. } => cause.class(),
-            Self::Cohort { cause, .. } => cause.class(),
-            Self::Samples { .. }
-            | Self::NoSample { .. }
-            | Self::BidsSuffix { .. }
-            | Self::NoBidsLabel { .. }
-            | Self::NoSuchStage { .. }
-            | Self::NoSuchPlace { .. }
-            | Self::PlotFormat { .. }
-            | Self::ResultInTheWay { .. }
-            | Self::InputInTheWay { .. }
-            | Self::NoSuchSpace { .. }
-            | Self::EmptyRange { .. }
-            | Self::Input { .. }
-            | Self::OtherSettings { .. }
-            | Self::OtherInput { .. }
-            | Self::RunInTheWay { .. }
-            | Self::Settled { .. }
-            | Self::SettledTree { .. }
-            | Self::NotSwept { .. }
-            | Self::SweepSize { .. }
-            | Self::GroupSize { .. }
-            | Self::UnknownCode { .. }
-            | Self::UnknownKey { .. }
-            | Self::Threads { .. } => Class::Usage,
-            Self::BidsDataset { .. } => Class::Input,
-            Self::NoRun { .. }
-            | Self::NoGroup { .. }
-            | Self::NoBidsScan { .. }
-            | Self::NoTree { .. }
-            | Self::MissingArtifact { .. }
-            | Self::Read { .. }
-            | Self::Write { .. }
-            | Self::Print { .. } => Class::Io,
-            Self::Altered { .. } | Self::Certificate { .. } | Self::Unverified { .. } => Class::Uncertified,
-            Self::TooLarge { .. } | Self::Memory { .. } => Class::Limit,
-            Self::Create { .. }
-            | Self::FileInTheWay { .. }
-            | Self::FolderInTheWay { .. }
-            | Self::BidsOutput { .. } => Class::CannotCreate,
-            Self::Locked { .. } => Class::Locked,
-        }
-    }
-
-    fn hint(&self) -> String {
-        match self {
-            Self::Config(error) => error.hint(),
-            Self::Stage { cause, .. } | Self::File { cause, .. } => cause.hint(),
-            Self::Unverified { .. } => "use none of it; make it again with espalier run".to_owned(),
-            Self::Certificate { .. } => "make the embedding again with espalier embed".to_owned(),
-            Self::NoSuchPlace { .. } => "branches.tsv has the branches, nodes.tsv the nodes".to_owned(),
-            Self::PlotFormat { .. } => "name it with one of these endings".to_owned(),
-            Self::ResultInTheWay { .. } => "choose another name for the plot".to_owned(),
-            Self::InputInTheWay { .. } => "choose another folder with -o".to_owned(),
-            Self::FileInTheWay { .. } => {
-                "move it away, or choose another folder with -o; --force writes over it".to_owned()
-            }
-            Self::FolderInTheWay { .. } => "move it away, or choose another folder with -o".to_owned(),
-            Self::Point { cause, .. } => cause.hint(),
-            Self::NoSuchSpace { .. } => "give points in RAS+ mm, with --lps in LPS+ mm, or on the map in mm".to_owned(),
-            Self::NoRun { .. } => "run it with this version, at least up to --to embed".to_owned(),
-            Self::NoTree { .. } => "run it with this version, at least up to --to tree".to_owned(),
-            Self::SettledTree { .. } => {
-                "of finished runs seed, views.*, embed.* and render.* can be changed; or give the configs".to_owned()
-            }
-            Self::Samples { .. } => {
-                "columns are id, path, config, preset, label, labels, image, series, volume_index, seed, keys of the config such as embed.w_angle, and notes such as note or note.age; an empty cell or n/a says nothing".to_owned()
-            }
-            Self::NoSample { .. } => "the column id has the ids".to_owned(),
-            Self::BidsDataset { .. } => "mend it, or take the data set as it is with --skip-bids-validation".to_owned(),
-            Self::BidsOutput { .. } => "name a folder of its own for the results, such as derivatives/espalier".to_owned(),
-            Self::BidsSuffix { .. } => "say which with --suffix, and --filter desc=… if one kind has several".to_owned(),
-            Self::NoBidsScan { .. } => "volumes lie in sub-*/[ses-*/] and end with .nii or .nii.gz; see --suffix and --filter".to_owned(),
-            Self::NoBidsLabel { .. } => "labels are what stands after sub- and ses-".to_owned(),
-            Self::Cohort { .. } => "failures.tsv has the reasons, and the command that tries each again".to_owned(),
-            Self::NoGroup { .. } => {
-                "name run folders, or a folder that has run folders in it, such as the one that espalier run writes to".to_owned()
-            }
-            Self::GroupSize { .. } => "show them in several groups".to_owned(),
-            Self::RunInTheWay { .. } => "choose another folder with -o".to_owned(),
-            Self::NotSwept { .. } => "write --over KEY=V1,V2,…, such as --over embed.w_length=0.5,1,2,4".to_owned(),
-            Self::SweepSize { .. } => "give fewer values, or sweep one key at a time".to_owned(),
-            Self::Settled { .. } => "of a finished run only render.* can be changed; or compare its config".to_owned(),
-            Self::UnknownKey { nearest, .. } if nearest.is_empty() => {
-                "espalier config explain lists all keys".to_owned()
-            }
-            Self::UnknownKey { nearest, .. } => format!("did you mean {}?", nearest.join(" or ")),
-            Self::UnknownCode { nearest, .. } if nearest.is_empty() => "espalier explain lists all codes".to_owned(),
-            Self::UnknownCode { nearest, .. } => {
-                format!("did you mean {}? espalier explain lists all codes", nearest.join(" or "))
-            }
-            Self::MissingArtifact { .. } => "start from an earlier stage with --from, or name the file".to_owned(),
-            Self::Altered { .. } => {
-                "run the stage that makes it again; or, if the edit is meant, give the file to the stage's own \
-                 command with -o to another folder"
-                    .to_owned()
-            }
-            Self::Read { source, .. } if source.kind() == io::ErrorKind::NotFound => {
-                "check the path; a path in a config is relative to the config's own folder".to_owned()
-            }
-            Self::Read { source, .. } if source.kind() == io::ErrorKind::IsADirectory => {
-                "name a file: a config (.toml), a volume (.nii, .nii.gz, .hdr, .nrrd, .nhdr, .mha, .mhd) or a traced tree (.swc, .vtp, .vtk)".to_owned()
-            }
-            Self::OtherSettings { difference, .. } => {
-                format!("run with --from {}, or set {} back", difference.stage, difference.key)
-            }
-            Self::OtherInput { first, .. } => format!("run with --from {first}, or choose another folder with -o"),
-            Self::Input { .. } => "set it to the folder of the data".to_owned(),
-            Self::TooLarge { .. } => "allow more with --max-memory".to_owned(),
-            Self::Memory { stage: Stage::Render, .. } => {
-                "allow more with --max-memory, or take less with render.width_px, or render.space = false".to_owned()
-            }
-            Self::Memory { stage: Stage::Embed | Stage::Views, .. } => {
-                "allow more with --max-memory, or take fewer nodes with tree.resample".to_owned()
-            }
-            Self::Memory { .. } => {
-                "allow more with --max-memory, or take coarser voxels with volume.resample_mm".to_owned()
-            }
-            Self::Create { .. } => "choose another place for it with -o (a plot: with --plot)".to_owned(),
-            Self::Write { .. } => "check the free space and the permissions of the folder".to_owned(),
-            Self::Print { .. } => "what was done is in place; send standard output to where there is room".to_owned(),
-            Self::Locked { .. } => "wait for it with --wait, or choose another folder with -o".to_owned(),
-            Self::NoSuchStage { .. } | Self::EmptyRange { .. } | Self::Read { .. } | Self::Threads { .. } => {
-                String::new()
-            }
-        }
-    }
-
-    fn file(&self) -> Option<&Path> {
-        match self {
-            Self::Config(error) => error.file(),
-            Self::Stage { cause, .. } => cause.file(),
-            Self::File { path, cause } => cause.file().or(Some(path)),
-            Self::Point { source_name, .. } => source_name.as_ref().map(Path::new),
-            Self::MissingArtifact { path, .. }
-            | Self::Altered { path }
-            | Self::Samples { path, .. }
-            | Self::BidsDataset { path, .. }
-            | Self::Certificate { path, .. }
-            | Self::PlotFormat { path }
-            | Self::ResultInTheWay { path }
-            | Self::InputInTheWay { path }
-            | Self::FileInTheWay { path }
-            | Self::FolderInTheWay { path }
-            | Self::OtherInput { path, .. }
-            | Self::Read { path, .. }
-            | Self::TooLarge { path, .. }
-            | Self::Create { path, .. }
-            | Self::Write { path, .. } => Some(path),
-            Self::NoRun { folder, .. }
-            | Self::NoTree { folder, .. }
-            | Self::NoBidsScan { folder, .. }
-            | Self::BidsOutput { folder }
-            | Self::RunInTheWay { folder }
-            | Self::Settled { folder, .. }
-            | Self::SettledTree { folder, .. }
-            | Self::Unverified { folder, .. }
-            | Self::Locked { folder } => Some(folder),
-            _ => None,
-        }
-    }
-
-    fn line(&self) -> Option<usize> {
-        match self {
-            Self::Config(error) => error.line(),
-            Self::Stage { cause, .. } | Self::File { cause, .. } => cause.line(),
-            Self::Point { cause, .. } => cause.line(),
-            _ => None,
-        }
     }
 }
