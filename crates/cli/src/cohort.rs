@@ -109,11 +109,9 @@ fn perform(arguments: &Arguments, cohort: &Cohort, effort: &Effort) -> anyhow::R
     let show = Progress::new(&arguments.common);
     let n_samples = cohort.samples.len();
     let said = |sample: &Sample, turn: Turn<'_>| {
-        if arguments.common.json {
-            return tell(sample, turn);
-        }
         match turn {
             Turn::Begins if arguments.common.quiet => {}
+            turn if arguments.common.json => tell(sample, turn),
             Turn::Begins => progress::line(&format!("== {}", sample.id)),
             Turn::Done(summary) => progress::result(&format!("{}\tdigest {}", sample.id, summary.digest)),
             // The error of a single scan is that of the command.

@@ -13,6 +13,9 @@ pub(super) fn plain(message: &str) -> String {
     if let Some(rest) = line.strip_prefix("unknown variant ") {
         return format!("unknown word {}", without_list(rest));
     }
+    if line == "wanted string or table" {
+        return "expected a word in quotes".to_owned();
+    }
     if let Some(rest) = line.strip_prefix("missing field ") {
         return format!("the key {rest} is missing");
     }
@@ -46,6 +49,7 @@ fn found(value: &str) -> String {
         ("boolean", word) => bare(word),
         ("map", _) => "a table".to_owned(),
         ("sequence", _) => "a list".to_owned(),
+        ("unit", _) => "no word".to_owned(),
         _ => value.to_owned(),
     }
 }
@@ -65,7 +69,8 @@ fn expected(wanted: &str) -> String {
         "a string" | "string" | "a borrowed string" => "a text in quotes",
         "a sequence" => "a list",
         "a map" | "map" => "a table",
-        "string or table" => "a word in quotes",
+        "string or table" | "string only" => "a word in quotes",
+        "fewer elements in array" => "a shorter one",
         _ if wanted.starts_with("struct ") => "a table",
         _ if wanted.starts_with("enum ") => "a word in quotes",
         _ if wanted.starts_with("an array of length") || wanted.starts_with("a tuple of size") => {
@@ -104,6 +109,12 @@ mod tests {
             ("invalid length 2, expected an array of length 3", "found a list of 2, expected a list of 3"),
             ("unknown variant `big`, expected one of `a`, `b`", "unknown word `big`"),
             ("unknown field `w_angel`, expected `w_angle`", "unknown key `w_angel`"),
+            ("invalid type: unit variant, expected string only", "found no word, expected a word in quotes"),
+            ("wanted string or table", "expected a word in quotes"),
+            (
+                "invalid length 4, expected fewer elements in array",
+                "found a list of 4, expected a shorter one",
+            ),
             ("missing field `angle_deg`", "the key `angle_deg` is missing"),
             ("invalid basic string\nexpected `\"`", "invalid basic string"),
         ] {
