@@ -137,6 +137,11 @@ fn memory_that_does_not_suffice_is_told_before_and_refused_then() {
     // The stages before have kept to it, and the results stand.
     let output = espalier(folder.path(), &["run", "mask.mha", "-o", "out"]);
     assert!(stderr(&output).contains("embed        kept"), "{}", stderr(&output));
+    // The page too keeps to it.
+    let output = espalier(folder.path(), &["report", "out", "--force", "--max-memory", "15M"]);
+    let said = stderr(&output);
+    assert_eq!(output.status.code(), Some(5), "{said}");
+    assert!(said.contains("error[E-LIMIT-MEMORY]: report would take"), "{said}");
 }
 
 #[test]

@@ -33,6 +33,8 @@ pub struct Sizes {
     pub nodes: u64,
     /// Pixels of the map.
     pub pixels: u64,
+    /// Those of a map of the width that the figure of the organ in space has; 0 where there is none.
+    pub figure_pixels: u64,
 }
 
 /// What a stage costs.
@@ -68,7 +70,7 @@ struct PerSize {
     /// A unit of nodes to the power of [`SEARCH_POWER`].
     searched: f64,
     pixel: f64,
-    /// A pixel of the organ in space.
+    /// A pixel of [`Sizes::figure_pixels`].
     organ_pixel: f64,
 }
 
@@ -96,7 +98,7 @@ impl PerSize {
         let [voxels, foreground, nodes, pixels] =
             [sizes.voxels, sizes.foreground, sizes.nodes, sizes.pixels].map(|size| size as f64);
         let grown = if sizes.held_bytes > 0 { foreground } else { 0.0 };
-        let organ_pixels = if foreground > 0.0 { pixels } else { 0.0 };
+        let organ_pixels = if foreground > 0.0 { sizes.figure_pixels as f64 } else { 0.0 };
         self.fixed
             + self.voxel * voxels
             + self.held * voxels * sizes.held_bytes as f64
@@ -135,7 +137,9 @@ fn constants(stage: Stage) -> [PerSize; 2] {
         Stage::Embed => [PerSize { fixed: 0.01, searched: 8e-4, ..none }, PerSize { node: 2000.0, ..none }],
         Stage::Render => [
             PerSize { fixed: 0.05, node: 1e-4, pixel: 1.3e-7, organ_pixel: 4.5e-7, ..none },
-            PerSize { fixed: 14e6, foreground: 11.0, node: 1000.0, pixel: 5.8, organ_pixel: 19.0, ..none },
+            // Of three organs at 1600 and 4096 pixels, with and without the figure: 0.8 to 1.1, and up to 1.7 for
+            // one that leaves most of its page empty.
+            PerSize { fixed: 20e6, foreground: 60.0, node: 1000.0, pixel: 11.0, organ_pixel: 14.0, ..none },
         ],
         Stage::Report => [
             PerSize { fixed: 0.03, voxel: 3e-10, node: 1e-5, ..none },
@@ -178,9 +182,11 @@ impl Sizes {
 
     /// With those of the pictures.
     pub(crate) fn and_pictures(self, params: &RenderParams) -> Self {
-        let width = f64::from(params.width_px);
         let aspect = params.aspect.unwrap_or(ASPECT);
-        Self { pixels: (width * width * aspect) as u64, ..self }
+        let pixels = |width_px: u32, aspect: f64| (f64::from(width_px) * f64::from(width_px) * aspect) as u64;
+        let figure_px = if params.space { params.width_px.min(espalier_render::MOST_SPACE_WIDTH) } else { 0 };
+        // The figure's height follows from the organ alone.
+        Self { pixels: pixels(params.width_px, aspect), figure_pixels: pixels(figure_px, ASPECT), ..self }
     }
 
     /// With what follows from the others as a rule, where it is not known.
@@ -217,12 +223,14 @@ mod tests {
             skeleton: 10,
             nodes: 5,
             pixels: 50,
+            figure_pixels: 50,
         };
         let larger = [
             Sizes { voxels: 2000, ..small },
             Sizes { foreground: 200, ..small },
             Sizes { nodes: 50, ..small },
             Sizes { pixels: 500, ..small },
+            Sizes { figure_pixels: 500, ..small },
         ];
         for stage in Stage::ALL {
             let least = cost(stage, &small);

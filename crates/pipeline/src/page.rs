@@ -13,6 +13,7 @@ use serde::Deserialize;
 use crate::artifacts::Artifacts;
 use crate::config::Source;
 use crate::error::Error;
+use crate::estimate::Sizes;
 use crate::folder::RunFolder;
 use crate::labels;
 use crate::provenance;
@@ -43,6 +44,8 @@ pub(crate) fn report(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let embedding = step.take(Artifacts::embedding)?;
     let comparison = step.take(Artifacts::comparison)?;
     let mask = if has_mask(step) { Some(step.take(Artifacts::mask)?) } else { None };
+    let sizes = mask.as_deref().map(Sizes::of_mask).unwrap_or_default();
+    step.must_fit(&sizes.and_tree(&tree))?;
     let is_own = is_of_folder(step.artifacts);
     let text = |file: &str| if is_own { step.folder.text_if_there(file) } else { Ok(None) };
     let rows = |file: &str| Ok::<_, Error>(text(file)?.map(|text| Rows::parse(&text)));

@@ -117,8 +117,8 @@ impl Stage {
         match self {
             Self::Phantom | Self::Views => 1,
             Self::Radius => 2,
-            Self::Skeleton | Self::Tree | Self::Render | Self::Report => 3,
-            Self::Volume | Self::Embed => 4,
+            Self::Skeleton | Self::Tree => 3,
+            Self::Volume | Self::Embed | Self::Render | Self::Report => 4,
         }
     }
 

@@ -86,7 +86,7 @@ pub use planar::{planar_png, planar_svg};
 pub use profile::{Stretch, Way, profile};
 pub use reformation::params::{Slab, VolumeParams, Window};
 pub use side_by_side::{Panel, Section, SideBySide, side_by_side};
-pub use space::{Organ, Subject as SpaceSubject, space};
+pub use space::{MOST_WIDTH as MOST_SPACE_WIDTH, Organ, Subject as SpaceSubject, space};
 pub use thumbnail::{Thumbnail, thumbnail};
 
 /// The pictures of a tree.

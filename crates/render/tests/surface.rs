@@ -200,6 +200,40 @@ fn a_bend_has_its_closed_form_inside_and_is_a_ball_outside() {
 }
 
 #[test]
+fn no_hair_stands_beside_a_thin_branch_on_a_thick_one() {
+    let tree = Tree::new(&[
+        node(-30.0, 0.0, 0.0, 8.0, None),
+        node(0.0, 0.0, 0.0, 8.0, Some(0)),
+        node(30.0, 0.0, 0.0, 8.0, Some(1)),
+        node(6.0, 0.0, 24.0, 1.5, Some(1)),
+    ])
+    .expect("a tree");
+    let layers = Layers::of(&tree, &flat(&tree), &Params { width_px: 1200, ..Params::default() });
+    // What is covered is next to something that is covered on both sides, or above or below: nothing is a pixel wide.
+    for (x, y) in layers.pixels() {
+        if x == 0 || y == 0 || x + 1 == layers.width || y + 1 == layers.height || layers.at("A", x, y) < 0.6 {
+            continue;
+        }
+        let is_in = |x: usize, y: usize| layers.at("A", x, y) > 0.05;
+        let n_sides = [is_in(x - 1, y) || is_in(x + 1, y), is_in(x, y - 1) || is_in(x, y + 1)];
+        let n_around = [
+            (x - 1, y),
+            (x + 1, y),
+            (x, y - 1),
+            (x, y + 1),
+            (x - 1, y - 1),
+            (x + 1, y - 1),
+            (x - 1, y + 1),
+            (x + 1, y + 1),
+        ]
+        .into_iter()
+        .filter(|&(x, y)| is_in(x, y))
+        .count();
+        assert!(n_sides == [true; 2] && n_around >= 4, "{}: {n_around}", layers.plane(x, y));
+    }
+}
+
+#[test]
 fn nodes_of_a_straight_tube_do_not_show() {
     // Steps of all lengths, from far less than the radius to far more.
     let mut stream = espalier_geom::random::Stream::new(3, espalier_geom::random::Purpose::Test, 0, 0);

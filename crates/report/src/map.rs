@@ -84,8 +84,10 @@ pub(crate) fn body(facts: &Facts<'_>) -> Markup {
         }
         @if let Some((png, [width, height])) = facts.space_png.as_ref().and_then(|png| Some((png, size_px(png)?))) {
             figure.print {
-                svg viewBox={ "0 0 " (width) " " (height) } role="img" aria-label="the organ in space, its centreline and the map, a colour for each branch" {
-                    image href=(png_address(png)) width=(width) height=(height) {}
+                div.strip {
+                    svg viewBox={ "0 0 " (width) " " (height) } role="img" aria-label="the organ in space, its centreline and the map, a colour for each branch" {
+                        image href=(png_address(png)) width=(width) height=(height) {}
+                    }
                 }
                 figcaption { "The organ in space and on the plane: same colour and same number, same branch." }
             }

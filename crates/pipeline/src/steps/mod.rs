@@ -75,7 +75,7 @@ impl<'a> Step<'a> {
     }
 
     /// Checks that the stage will not take more memory than allowed, before it takes any.
-    fn must_fit(&self, sizes: &Sizes) -> Result<(), Error> {
+    pub(crate) fn must_fit(&self, sizes: &Sizes) -> Result<(), Error> {
         let (needed, limit) =
             (estimate::cost(self.stage, sizes).bytes, self.artifacts.read_options.max_bytes);
         if needed > limit { Err(Error::Memory { stage: self.stage, needed, limit }) } else { Ok(()) }

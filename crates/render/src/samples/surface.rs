@@ -164,12 +164,13 @@ impl Surface {
         self.say = self.say.max(say);
     }
 
-    /// Moves the outline by what joining has added to the highest cone.
+    /// Moves the outline by what joining has added to the highest cone. That is not always the nearest one, for a thin
+    /// cone's level falls less steeply beside it: what was added moves the highest cone's outline, not the nearest's.
     pub(super) fn widen(&mut self, best: &Best) {
         let edge_of = |level: f32, radius: f32| (radius * radius - level).max(0.0).sqrt() - radius;
         if self.level > best.hit.level {
             let moved = edge_of(best.hit.level, best.hit.radius) - edge_of(self.level, self.radius);
-            self.outside -= moved.max(0.0);
+            self.outside = self.outside.min(best.hit.outside - moved.max(0.0));
         }
     }
 }

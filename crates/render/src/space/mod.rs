@@ -37,8 +37,8 @@ use crate::side_by_side::SideBySide;
 use crate::text::{Anchor, Face};
 use crate::{Error, sketch, svg};
 
-/// Wider figures show no more of a mask of a thousand voxels.
-const MOST_WIDTH: u32 = 4096;
+/// The most pixels that the figure of the organ in space is wide: more show no more of a mask of a thousand voxels.
+pub const MOST_WIDTH: u32 = 4096;
 /// The font size of notes in layout units, and line height over font size.
 const NOTE: f64 = 1.12;
 const LEADING: f64 = 1.4;
