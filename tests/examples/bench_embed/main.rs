@@ -10,7 +10,7 @@
 //! | `--ablation` | the solver without one of its parts |
 //! | `--campaign` | random trees of eight families: crossings, and what fails |
 //!
-//! Options: `--trees N` and `--seed N` for the campaign, `--largest N` nodes of a tree, `--swarm full|small|none`.
+//! Options: `--sizes` takes the phantoms of `--scale` for any table, `--trees N` and `--seed N` for the campaign, `--largest N` nodes of a tree, `--swarm full|small|none`.
 //! Folders are searched for `.swc` files; `g9` among them is an airway phantom of 4099 nodes that stays crowded; without
 //! any, phantoms are grown. Lines are printed as they come; all times are wall-clock seconds.
 #![allow(clippy::print_stdout, clippy::disallowed_methods, reason = "an example that measures")]
@@ -39,6 +39,7 @@ enum Swarm {
 struct Options {
     mode: Mode,
     paths: Vec<PathBuf>,
+    has_sizes: bool,
     largest: usize,
     n_trees: u32,
     seed: u32,
@@ -70,6 +71,7 @@ fn options() -> Result<Options, Box<dyn Error>> {
     let mut options = Options {
         mode: Mode::Methods,
         paths: Vec::new(),
+        has_sizes: false,
         largest: usize::MAX,
         n_trees: 10_000,
         seed: 0,
@@ -79,6 +81,7 @@ fn options() -> Result<Options, Box<dyn Error>> {
     while let Some(word) = words.next() {
         let mut value = || words.next().ok_or(format!("{word} needs a value"));
         match word.as_str() {
+            "--sizes" => options.has_sizes = true,
             "--scale" => options.mode = Mode::Scale,
             "--against-pso" => options.mode = Mode::AgainstPso,
             "--ablation" => options.mode = Mode::Ablation,

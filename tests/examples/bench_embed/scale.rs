@@ -64,7 +64,8 @@ pub(crate) fn print(options: &Options) -> Result<bool, Box<dyn Error>> {
     Ok(is_certified)
 }
 
-fn trees(largest: usize) -> Result<Vec<Named>, Box<dyn Error>> {
+/// The phantoms, neurons and airways, up to a size.
+pub(crate) fn trees(largest: usize) -> Result<Vec<Named>, Box<dyn Error>> {
     let mut trees = Vec::new();
     for n_nodes in NEURONS.into_iter().filter(|&n_nodes| n_nodes <= largest) {
         let params = espalier_phantom::Params { n_nodes, ..espalier_phantom::Params::default() };

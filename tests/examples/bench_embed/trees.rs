@@ -26,8 +26,12 @@ const SCALES: [(&str, [f64; 3]); 1] = [("diadem_OP_", [0.33, 0.33, 1.0])];
 
 /// The trees that the options ask for, small ones first; files that are no tree are named and left out.
 pub(crate) fn trees(options: &Options) -> Result<Vec<Named>, Box<dyn Error>> {
-    let mut trees = if options.paths.is_empty() { phantoms()? } else { of_files(&options.paths)? };
-    if options.paths.is_empty() && options.mode == Mode::Ablation {
+    let mut trees = match &options.paths[..] {
+        _ if options.has_sizes => scale::trees(options.largest)?,
+        [] => phantoms()?,
+        paths => of_files(paths)?,
+    };
+    if options.paths.is_empty() && !options.has_sizes && options.mode == Mode::Ablation {
         trees.push(crowded_airway()?);
     }
     trees.retain(|named| named.tree.n_nodes() <= options.largest);
