@@ -80,9 +80,14 @@ impl RunFolder {
         }
     }
 
-    /// Whether this run made the folder and has put nothing into it.
+    /// Whether this run made the folder and has put nothing into it. A result that could not be written to its end may be in
+    /// place all the same: a disk that fails says so after the name is given, too.
     pub(crate) fn is_unused(&self) -> bool {
-        !self.made.is_empty() && self.digests.is_empty()
+        !self.made.is_empty() && self.has_left_nothing()
+    }
+
+    fn has_left_nothing(&self) -> bool {
+        self.digests.is_empty() && !self.is_changing.load(Ordering::Relaxed)
     }
 
     /// Removes the folders that this run made, as far as they are empty. From then on nothing may be written: another run
@@ -94,7 +99,7 @@ impl RunFolder {
 
     /// Takes the file of the lock away again from a folder in which no run has left anything.
     pub(crate) fn leave_as_found(&self) {
-        if self.is_lock_new && self.digests.is_empty() && !self.path.join("provenance").exists() {
+        if self.is_lock_new && self.has_left_nothing() && !self.path.join("provenance").exists() {
             Lock::remove_file(&self.path);
         }
     }
@@ -114,7 +119,11 @@ impl RunFolder {
         if self.is_changing.swap(true, Ordering::Relaxed) {
             return Ok(());
         }
-        lock.say_changing(true).map_err(|source| Error::Write { path: self.path.join(".lock"), source })
+        lock.say_changing(true).map_err(|source| {
+            // Nothing is written before it could be said.
+            self.is_changing.store(false, Ordering::Relaxed);
+            Error::Write { path: self.path.join(".lock"), source }
+        })
     }
 
     /// Writes a result file, whole or not at all.
@@ -339,5 +348,25 @@ pub(crate) fn file_digest(path: &Path) -> io::Result<(u64, String)> {
         }
         hasher.update(&piece[..n_read]);
         n_bytes += n_read as u64;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As with an error of the disk after a result has got its name: its run knows only that it could not be written.
+    #[test]
+    fn a_result_that_may_be_there_keeps_the_folder_known_as_ours() {
+        let parent = tempfile::tempdir().expect("temporary folder");
+        let path = parent.path().join("run");
+        let mut folder = RunFolder::open(&path).expect("a folder");
+        assert!(folder.is_unused());
+        fs::write(path.join("stages"), "in the way").expect("a file");
+        assert!(folder.write("stages/01-volume/mask.nii.gz", b"x").is_err());
+        assert!(!folder.is_unused());
+        folder.leave_as_found();
+        drop(folder);
+        assert!(RunFolder::open(&path).expect("a folder").was_cut_short());
     }
 }
