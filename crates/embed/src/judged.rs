@@ -67,7 +67,7 @@ pub(crate) fn judge(
 }
 
 impl Judged {
-    /// Whether no length and no angle is lost, whatever it weighs: nothing can be better for these targets.
+    /// Whether no length and no angle is lost, whatever it weighs: the least of Eq. 4 for these targets.
     pub(crate) fn is_optimal(&self) -> bool {
         let Scored { length_ratio, angle_ratio, .. } = &self.scored;
         length_ratio.iter().chain(angle_ratio).all(|&ratio| ratio == 0.0)

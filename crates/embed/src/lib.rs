@@ -184,17 +184,15 @@ pub fn embed_edited(
     let targets = targets::targets(tree, &branches, views, params.targets)?;
     let mut problem = problem::Problem::new(tree, branches, targets, params);
     problem.is_crowded = prospect::is_crowded(&problem, params, seed);
-    let (mirrored, mirrors_report) = solver::mirrors::mirrored(&problem, params, seed);
+    let sides = solver::mirrors::mirrored(&problem, params, seed);
     let problems = methods::Problems {
-        frozen: mirrored.as_ref().unwrap_or(&problem),
-        unflipped: mirrored.is_some().then_some(&problem),
-        search_evaluations: mirrors_report
-            .get("mirror_evaluations")
-            .map_or(0, |evaluations| evaluations as u64),
+        frozen: sides.problem.as_ref().unwrap_or(&problem),
+        unflipped: sides.problem.is_some().then_some(&problem),
+        search_evaluations: sides.evaluations,
     };
     let layouts = methods::run(problems, views, params, seed, events)?;
     let mut embedded = select::select(problems, layouts, edits, (params, seed))?;
-    embedded.report.extend(mirrors_report);
+    embedded.report.extend(sides.report);
     embedded.report.extend(weights_report);
     Ok(embedded)
 }

@@ -10,8 +10,8 @@
 //! An edit that cannot be freed of crossings at once may be by a later one; only the end decides. 4. After the last,
 //! where widths are to be avoided, what is not pinned gives way to the widths of the tubes again.
 //! **Guarantees** pinned turns are as asked, also on the other side of their targets, and pinned branches keep their
-//! length. The edits at the beginning of a list do what they would do without the rest of it. An edit that needs no
-//! repair leaves every loss of other branches as it is or lowers it.
+//! length. But for step 4, the edits at the beginning of a list do what they would do without the rest of it, and an
+//! edit that needs no repair leaves every loss of other branches as it is or lowers it.
 //! **Source** [Hu2022] section 3.3: "a user can specify any curve or curve segment and rotate it around an anchor node.
 //! Following the manual adjustment, our method checks to remove any newly introduced intersections."
 //! **Cost** a repair for each edit.
@@ -41,6 +41,8 @@ pub(crate) struct Base<'a> {
     pub(crate) positions: &'a [DVec2],
     /// Whether the picture shows its mirror image: counter-clockwise there is clockwise here.
     pub(crate) is_reflected: bool,
+    /// By what its lengths were scaled.
+    pub(crate) length_scale: f64,
     /// The step to which it is rounded, in mm.
     pub(crate) quantum_mm: f64,
     /// Its energy as written.
@@ -73,6 +75,7 @@ pub(crate) fn replay(
         pins: Pins::none(problem),
         positions: base.positions.to_vec(),
         certificate: certify(problem.tree, base.positions),
+        length_scale: base.length_scale,
         quantum_mm: base.quantum_mm,
     };
     let (mut records, mut work, mut energy) = (Vec::with_capacity(edits.len()), 0, base.energy);
@@ -139,14 +142,15 @@ struct State<'a> {
     pins: Pins,
     positions: Vec<DVec2>,
     certificate: Certificate,
+    length_scale: f64,
     quantum_mm: f64,
 }
 
 impl<'a> State<'a> {
+    /// The energy at the scale of the base layout.
     fn energy(&self) -> f64 {
-        energy::score(self.problem, &self.positions, self.quantum_mm, self.certificate.crossings)
-            .energy
-            .total()
+        let scaled: Vec<DVec2> = self.positions.iter().map(|&place| place * self.length_scale).collect();
+        energy::score(self.problem, &scaled, self.quantum_mm, self.certificate.crossings).energy.total()
     }
 
     /// Turns the joint, and pins the branch from there on.

@@ -96,6 +96,7 @@ fn edited(
     let unscaled: Vec<DVec2> = winner.drawn.iter().map(|&place| place / scale).collect();
     let base = replay::Base {
         positions: &unscaled,
+        length_scale: scale,
         is_reflected: winner.posed.pose.is_reflected,
         quantum_mm: winner.posed.quantum_mm,
         energy: winner.scored.energy.total(),

@@ -1,4 +1,7 @@
 //! A tree laid flat.
+//!
+//! These types are their own file: the names and the order of their fields are the format, and a change of either needs
+//! the next version (see `file`).
 
 mod comparison;
 mod file;

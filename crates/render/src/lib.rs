@@ -12,7 +12,7 @@
 //! | 7 | `reformation` | the pixels of a scan along the map, in place of 5 and 6 |
 //! | 8 | `paint`, `svg`, `outline`, `pdf`, `layers` | the files |
 //! | 9 | `planar` | steps 1 to 8 of the map and of the global view |
-//! | 10 | `side_by_side`, `tiling`, `parts`; `space`; `juxtaposed`; `chart`, `convergence`, `profile`; `thumbnail` | several layouts in one figure; the organ in space beside its map; two trees on one map; charts of numbers; a map among many |
+//! | 10 | `side_by_side`, `tiling`, `parts`; `space`; `juxtaposed`; `chart`, `convergence`, `profile`; `thumbnail` | figures of several layouts, of the organ, of two trees, of numbers; a map among many |
 //!
 //! **Source** section 4.1 of [Hu2022].
 

@@ -19,6 +19,7 @@ pub(crate) struct Grid {
     cell_px: f64,
     size: [usize; 2],
     is_taken: Vec<bool>,
+    n_free: usize,
 }
 
 impl Grid {
@@ -26,7 +27,8 @@ impl Grid {
     pub(crate) fn new(size: [u32; 2], unit_px: f64) -> Self {
         let cell_px = CELL * unit_px;
         let size = size.map(|pixels| (f64::from(pixels) / cell_px) as usize + 1);
-        Self { cell_px, size, is_taken: vec![false; size[0] * size[1]] }
+        let n_cells = size[0] * size[1];
+        Self { cell_px, size, is_taken: vec![false; n_cells], n_free: n_cells }
     }
 
     /// The cells from a point to another, inside of the page.
@@ -41,6 +43,7 @@ impl Grid {
     /// Takes the cells that a box touches.
     pub(crate) fn take(&mut self, low: DVec2, high: DVec2) {
         for cell in self.cells(low, high) {
+            self.n_free -= usize::from(!self.is_taken[cell]);
             self.is_taken[cell] = true;
         }
     }
@@ -71,6 +74,10 @@ impl Grid {
             let radius_px = page.radius_px(scene.radii_mm[node].max(scene.radii_mm[parent]));
             let n_steps = (a.distance(b) / self.cell_px).min(1e5) as usize + 1;
             for i in 0..=n_steps {
+                // Tubes as wide as the page, of radii in a wrong unit, leave nothing after the first.
+                if self.n_free == 0 {
+                    return;
+                }
                 let at = a.lerp(b, i as f64 / n_steps as f64);
                 self.take(at - radius_px, at + radius_px);
             }

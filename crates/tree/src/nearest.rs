@@ -20,7 +20,7 @@ const LEAF: usize = 8;
 pub(crate) struct NearestSphere {
     /// (index, sample), those of a part side by side.
     samples: Vec<(usize, Sample)>,
-    /// The parts, a part's first half after it.
+    /// The parts; both halves of a part stand after it.
     parts: Vec<Part>,
 }
 

@@ -10,7 +10,8 @@
 //! | `--ablation` | the solver without one of its parts |
 //! | `--campaign` | random trees of eight families: crossings, and what fails |
 //!
-//! Options: `--sizes` takes the phantoms of `--scale` for any table, `--trees N` and `--seed N` for the campaign, `--largest N` nodes of a tree, `--swarm full|small|none`.
+//! Options: `--sizes` takes the phantoms of `--scale` for any table, `--trees N` and `--seed N` are for the campaign,
+//! `--largest N` leaves out larger trees, `--swarm full|small|none`.
 //! Folders are searched for `.swc` files; `g9` among them is an airway phantom of 4099 nodes that stays crowded; without
 //! any, phantoms are grown. Lines are printed as they come; all times are wall-clock seconds.
 #![allow(clippy::print_stdout, clippy::disallowed_methods, reason = "an example that measures")]

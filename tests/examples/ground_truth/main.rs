@@ -2,10 +2,11 @@
 //!
 //! For each grid, an airway and a vessel tree of the phantom generator, from four masks: the voxels whose centre lies
 //! in the body (`clean`), the same with 15 % of its surface's voxels flipped (`rough`), and what region growing makes of
-//! its noisy CT, in a band that is given (`ct`), and by the preset (`preset`), which finds threshold and trachea itself. Columns and tolerances are those of `espalier_tests::ground_truth`. Every tip of the truth
-//! counts; what a grid cannot show is part of the figure.
-//! `--only WORD` takes the rows that hold the word, `--small` one grid, `--seed N` another tree of each kind than that of seed 7;
-//! `--false` lists each tip that is not true, with its branch, `--lost` each tip that was not found, with
+//! its noisy CT, in a band that is given (`ct`), and by the preset (`preset`), which finds threshold and trachea itself.
+//! Columns and tolerances are those of `espalier_tests::ground_truth`. Every tip of the truth counts; what a grid cannot
+//! show is part of the figure.
+//! `--only WORD` takes the rows that hold the word, `--small` one grid, `--seed N` another tree of each kind than that
+//! of seed 7; `--false` lists each tip that is not true, with its branch, `--lost` each tip that was not found, with
 //! what lies nearest to it.
 #![allow(clippy::print_stdout, clippy::print_stderr, clippy::disallowed_methods, reason = "a program")]
 

@@ -106,7 +106,7 @@ pub(crate) fn layout(problem: &Problem, cone: &[f64], params: &Params) -> Layout
         run.improve(&separation, Descents::Last);
         run
     };
-    let best = if params.solver.untangling && !problem.is_thread() {
+    let best = if prospect == Prospect::Free || (params.solver.untangling && !problem.is_thread()) {
         let (from_cone, from_targets) = rayon::join(from_cone, from_targets);
         if from_targets.is_better(&from_cone) { from_targets } else { from_cone }
     } else {

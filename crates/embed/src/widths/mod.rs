@@ -60,6 +60,7 @@ pub(crate) fn change(problem: &Problem, positions: &[DVec2], params: &Params) ->
     }
     let shape = avoid::avoid(problem, &params.solver, &nearest_shape(problem, positions));
     let avoided = shape.map(|shape| shape.positions(problem));
+    // The shape is only near the layout where that was not made by ratios.
     let avoided = avoided.filter(|avoided| measure(problem, avoided).overlaps < found.overlaps);
     let is_same = avoided.is_none();
     let positions = avoided.unwrap_or_else(|| positions.to_vec());

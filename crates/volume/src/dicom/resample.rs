@@ -5,7 +5,8 @@
 //! slices keep or undercut, stretched so that the first and the last plane lie on the first and the last slice;
 //! aside, room for every slice; 2. each plane between the two slices around it: linear along the normal, bilinear
 //! within each slice, since the slices lie aside of each other; masks and labels by the policy of
-//! [`interpolate`](crate::interpolate), where the modality says whether they may be labels; 3. outside the slices the smallest value of all, which is air in a CT.
+//! [`interpolate`](crate::interpolate), where the modality says whether they may be labels; 3. outside the slices the
+//! smallest value of all, which is air in a CT.
 //! **Guarantees** a value stands where the headers say it was measured, in mm; on a slice that needs no shift by
 //! parts of a pixel the values are the slice's own.
 //! **Cost** O(new voxels), in parallel over planes.

@@ -119,27 +119,32 @@ pub(crate) struct Mirrored {
     pub(crate) visits: u64,
 }
 
-/// The problem with chosen sides, if that is asked for and changes anything, and what was done.
-pub(crate) fn mirrored<'t>(
-    problem: &Problem<'t>,
-    params: &Params,
-    seed: u64,
-) -> (Option<Problem<'t>>, Report) {
+/// What came of the search.
+#[derive(Default)]
+pub(crate) struct Chosen<'t> {
+    /// The problem with chosen sides, if that is asked for and changes anything.
+    pub(crate) problem: Option<Problem<'t>>,
+    pub(crate) evaluations: u64,
+    pub(crate) report: Report,
+}
+
+/// The problem with chosen sides, and what was done.
+pub(crate) fn mirrored<'t>(problem: &Problem<'t>, params: &Params, seed: u64) -> Chosen<'t> {
     let mut report = Report::default();
     let wants_solver = params.method == Method::Solver || params.methods.contains(&Method::Solver);
     if !(wants_solver && params.solver.mirrors) || problem.is_thread() {
-        return (None, report);
+        return Chosen::default();
     }
     match Prospect::of(problem) {
         Prospect::Free if params.solver.root_keep_out != KeepOut::On => {
             report.count_usize("mirror_crossings_before", 0);
-            return (None, report);
+            return Chosen { report, ..Chosen::default() };
         }
         Prospect::Crowded => {
             let message = "exact angles cross each other all over: the sides of turns are not searched, and the \
                            solver does little";
             report.warn("W-EMBED-CROWDED", message);
-            return (None, report);
+            return Chosen { report, ..Chosen::default() };
         }
         _ => {}
     }
@@ -157,7 +162,11 @@ pub(crate) fn mirrored<'t>(
     report.count("mirror_visits", found.visits as f64);
     let is_changed = found.targets.kind != problem.targets.kind;
     let branches = problem.branches.clone();
-    (is_changed.then(|| Problem::new(problem.tree, branches, found.targets, params)), report)
+    Chosen {
+        problem: is_changed.then(|| Problem::new(problem.tree, branches, found.targets, params)),
+        evaluations: found.evaluations,
+        report,
+    }
 }
 
 /// Searches for the sides of all turns.
