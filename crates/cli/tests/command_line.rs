@@ -301,6 +301,25 @@ fn verify_prints_a_table_and_fails_where_a_claim_does() {
     fs::remove_file(folder.path().join("out/SHA256SUMS")).expect("remove");
     refused(&folder, &["verify", "out"], 8, &["error[E-VERIFY-MALFORMED]", "out/SHA256SUMS", "no such file"]);
     refused(&folder, &["verify", "."], 8, &["error[E-VERIFY-MALFORMED]", "out/SHA256SUMS"]);
+
+    // One that was killed, one whose list is damaged: neither hides the other, nor a run that holds.
+    let good = [&["run", "y.swc", "-o", "all/z"], &small[..]].concat();
+    assert_eq!(espalier(folder.path(), &good).status.code(), Some(0));
+    let put = |place: &str, text: &str| {
+        let path = folder.path().join(place);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("folder");
+        fs::write(path, text).expect("write");
+    };
+    put("all/killed/stages/04-tree/report.json", "{}");
+    put("all/listed/SHA256SUMS", "");
+    let output = espalier(folder.path(), &["verify", "all"]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(8), "{text}");
+    assert!(stderr(&output).contains("error[E-VERIFY]"), "{}", stderr(&output));
+    for place in ["all/killed/SHA256SUMS", "all/listed/SHA256SUMS", "all/z/tree.swc"] {
+        assert!(text.contains(place.trim_start_matches("all/")), "{place}: {text}");
+    }
+    assert!(text.contains(" 2 fail, "), "{text}");
     fs::create_dir(folder.path().join("empty")).expect("folder");
     refused(
         &folder,

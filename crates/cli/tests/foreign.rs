@@ -72,6 +72,83 @@ fn a_file_beside_results_stays_too() {
     assert_eq!(digest(&run(folder.path(), &["-o", "out"])), whole);
 }
 
+/// A run that ends early removes the results of later stages: those that are ones.
+#[test]
+fn a_file_under_the_name_of_a_later_result_stays() {
+    let scan = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/y.nii.gz");
+    for name in ["planar.png", "views.json", "report.html"] {
+        let folder = folder();
+        fs::copy(&scan, folder.path().join("mask.nii.gz")).expect("copy");
+        fs::write(folder.path().join(name), "mine").expect("write");
+        let before = files_below(folder.path());
+        let on_mask = ["skeleton", "mask.nii.gz", "-o", "."];
+        for said in [
+            run(folder.path(), &["-o", ".", "--to", "tree"]),
+            run(folder.path(), &["-o", ".", "--to", "tree", "--dry-run"]),
+            Said::by(&espalier(folder.path(), &on_mask)),
+        ] {
+            assert_eq!(said.code, Some(73), "{name}: {}", said.error);
+            assert!(
+                said.error.contains("error[E-RUN-IN-WAY]: ./") && said.error.contains(name),
+                "{}",
+                said.error
+            );
+        }
+        assert_eq!(files_below(folder.path()), before, "nothing is left behind");
+        assert_eq!(fs::read(folder.path().join(name)).expect("bytes"), b"mine");
+    }
+}
+
+#[test]
+fn an_input_under_the_name_of_a_later_result_stays() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let scan = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/y.nii.gz");
+    let input = folder.path().join("branches.nii.gz");
+    fs::copy(&scan, &input).expect("copy");
+    for arguments in [
+        ["run", "branches.nii.gz", "-o", ".", "--to", "skeleton"].as_slice(),
+        &["run", "branches.nii.gz", "-o", ".", "--to", "skeleton", "--force"],
+        &["run", "branches.nii.gz", "-o", ".", "--to", "skeleton", "--dry-run"],
+        &["skeleton", "branches.nii.gz", "-o", ".", "--force"],
+    ] {
+        let said = Said::by(&espalier(folder.path(), arguments));
+        assert_eq!(said.code, Some(2), "{}", said.error);
+        assert!(said.error.contains("error[E-RUN-INPUT-IN-WAY]"), "{}", said.error);
+        assert_eq!(fs::read(&input).expect("bytes"), fs::read(&scan).expect("bytes"));
+    }
+}
+
+/// As a run leaves it that was killed while results of a stage changed.
+#[test]
+fn what_a_killed_run_has_left_counts_as_ours_from_its_stage_on() {
+    let whole = folder();
+    let expected = digest(&run(whole.path(), &["-o", "out"]));
+    let killed_at = |stage: &str, left: &str| {
+        let folder = folder();
+        fs::create_dir(folder.path().join("out")).expect("folder");
+        fs::write(folder.path().join("out/.lock"), format!("changing{stage}\n")).expect("write");
+        fs::write(folder.path().join("out").join(left), "left").expect("write");
+        folder
+    };
+    for (stage, left) in
+        [(" tree", "tree.swc"), (" tree", "planar.png"), (" embed", "dictionary.tsv"), ("", "tree.swc")]
+    {
+        let folder = killed_at(stage, left);
+        let dry = run(folder.path(), &["-o", "out", "--dry-run"]);
+        assert_eq!(dry.code, Some(0), "{stage} {left}: {}", dry.error);
+        assert_eq!(fs::read(folder.path().join("out").join(left)).expect("bytes"), b"left");
+        assert_eq!(digest(&run(folder.path(), &["-o", "out"])), expected);
+    }
+    for (stage, left) in [(" embed", "tree.swc"), (" report", "planar.png")] {
+        let folder = killed_at(stage, left);
+        for more in [["-o", "out"].as_slice(), &["-o", "out", "--dry-run"]] {
+            let said = run(folder.path(), more);
+            assert_eq!(said.code, Some(73), "{stage} {left}: {}", said.error);
+        }
+        assert_eq!(fs::read(folder.path().join("out").join(left)).expect("bytes"), b"left");
+    }
+}
+
 #[test]
 fn a_folder_in_place_of_a_result_is_named() {
     for name in ["tree.swc", "stages/04-tree/report.json", "SHA256SUMS", "provenance/run.json"] {

@@ -12,6 +12,7 @@ use sha2::{Digest, Sha256};
 
 use crate::error::Error;
 use crate::lock::{Lock, Patience};
+use crate::stage::Stage;
 
 pub(crate) const DIGEST_FILE: &str = "SHA256SUMS";
 
@@ -30,6 +31,8 @@ pub(crate) struct RunFolder {
     lock: Option<Lock>,
     /// Whether results have changed since `SHA256SUMS` was written.
     is_changing: AtomicBool,
+    /// The stage whose results, and those of later ones, change next; the first where no run says.
+    at_work: Stage,
 }
 
 impl RunFolder {
@@ -60,6 +63,7 @@ impl RunFolder {
             is_lock_new: false,
             lock: None,
             is_changing: AtomicBool::new(false),
+            at_work: Stage::ALL[0],
         }
     }
 
@@ -104,9 +108,15 @@ impl RunFolder {
         }
     }
 
-    /// Whether the last run here was ended while it changed results: nothing vouches yet for some that it has written.
-    pub(crate) fn was_cut_short(&self) -> bool {
-        self.lock.as_ref().is_some_and(|lock| lock.was_cut_short)
+    /// The stage at which the last run here was ended while it changed results: nothing vouches for some of this stage and
+    /// later ones that runs have written.
+    pub(crate) fn cut_short(&self) -> Option<Stage> {
+        self.lock.as_ref().map_or_else(|| Lock::cut_short_in(&self.path), |lock| lock.cut_short)
+    }
+
+    /// From now on only results of this stage and later ones change.
+    pub(crate) fn turn_to(&mut self, stage: Stage) {
+        self.at_work = stage;
     }
 
     pub(crate) fn path(&self) -> &Path {
@@ -119,7 +129,7 @@ impl RunFolder {
         if self.is_changing.swap(true, Ordering::Relaxed) {
             return Ok(());
         }
-        lock.say_changing(true).map_err(|source| {
+        lock.say_changing(self.at_work).map_err(|source| {
             // Nothing is written before it could be said.
             self.is_changing.store(false, Ordering::Relaxed);
             Error::Write { path: self.path.join(".lock"), source }
@@ -285,8 +295,7 @@ impl RunFolder {
     pub(crate) fn seal(&self) -> Result<String, Error> {
         let digest = self.write_digests()?;
         if let (Some(lock), true) = (&self.lock, self.is_changing.swap(false, Ordering::Relaxed)) {
-            lock.say_changing(false)
-                .map_err(|source| Error::Write { path: self.path.join(".lock"), source })?;
+            lock.say_changed().map_err(|source| Error::Write { path: self.path.join(".lock"), source })?;
         }
         Ok(digest)
     }
@@ -362,11 +371,13 @@ mod tests {
         let path = parent.path().join("run");
         let mut folder = RunFolder::open(&path).expect("a folder");
         assert!(folder.is_unused());
+        folder.turn_to(Stage::Volume);
         fs::write(path.join("stages"), "in the way").expect("a file");
         assert!(folder.write("stages/01-volume/mask.nii.gz", b"x").is_err());
         assert!(!folder.is_unused());
         folder.leave_as_found();
         drop(folder);
-        assert!(RunFolder::open(&path).expect("a folder").was_cut_short());
+        assert_eq!(RunFolder::to_read(&path).cut_short(), Some(Stage::Volume));
+        assert_eq!(RunFolder::open(&path).expect("a folder").cut_short(), Some(Stage::Volume));
     }
 }

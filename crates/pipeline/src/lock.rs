@@ -1,20 +1,24 @@
 //! One run at a time in a folder.
 //!
 //! **Guarantees** the system gives the lock back with the file's handle, however the process ends: a dead holder keeps
-//! nothing. Whoever waits for it sees all that the holder has written. While results change, the file of the lock says so:
-//! if its holder was killed meanwhile, the next one knows that there may be results which nothing vouches for yet.
+//! nothing. Whoever waits for it sees all that the holder has written. While results change, the file of the lock says so,
+//! and of which stage: if its holder was killed meanwhile, the next one knows that there may be results of that stage and
+//! later ones which nothing vouches for.
 
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use crate::error::Error;
+use crate::stage::Stage;
 
 const LOCK_FILE: &str = ".lock";
 /// How often a folder may vanish under whoever waits for it: once for each run that fails in it.
 const MOST_TRIES: u32 = 1000;
-/// What the file of the lock says while results change.
-const CHANGING: &[u8] = b"changing\n";
+/// What the file of the lock says while results change, before the name of the stage and the end of the line.
+const CHANGING: &str = "changing";
+/// The most that is read of it, in bytes.
+const MAX_SAID: u64 = 64;
 
 /// What to do where another run holds the folder.
 #[derive(Clone, Copy)]
@@ -28,8 +32,8 @@ pub(crate) enum Patience<'a> {
 /// The right to write to a folder; given back when it is dropped.
 pub(crate) struct Lock {
     file: File,
-    /// Whether its last holder ended while results changed.
-    pub(crate) was_cut_short: bool,
+    /// The stage whose results changed when its last holder ended, if some did.
+    pub(crate) cut_short: Option<Stage>,
 }
 
 impl Lock {
@@ -61,10 +65,8 @@ impl Lock {
             }
             // A run that fails takes the folder that it made away with it; the lock of a file that is gone locks nothing.
             if is_at(&file, &path) {
-                let mut said = Vec::new();
-                let read = Read::by_ref(&mut file).take(CHANGING.len() as u64).read_to_end(&mut said);
-                let was_cut_short = read.is_ok() && said == CHANGING;
-                return Ok(Self { file, was_cut_short });
+                let cut_short = stage_said_in(&mut file);
+                return Ok(Self { file, cut_short });
             }
         }
         Err(Error::Locked { folder: folder.to_owned() })
@@ -75,22 +77,41 @@ impl Lock {
         folder.join(LOCK_FILE).exists()
     }
 
-    /// Says in the file whether results are about to change, before they do.
-    pub(crate) fn say_changing(&self, is_changing: bool) -> io::Result<()> {
+    /// The stage whose results changed when the last holder of a folder ended; or change just now.
+    pub(crate) fn cut_short_in(folder: &Path) -> Option<Stage> {
+        stage_said_in(&mut File::open(folder.join(LOCK_FILE)).ok()?)
+    }
+
+    /// Says in the file that results of a stage and later ones are about to change, before they do. What was said there
+    /// before is written over in one go: at no moment is nothing said.
+    pub(crate) fn say_changing(&self, stage: Stage) -> io::Result<()> {
         let mut file = &self.file;
-        file.set_len(0)?;
-        if is_changing {
-            file.seek(SeekFrom::Start(0))?;
-            file.write_all(CHANGING)?;
-            file.sync_data()?;
-        }
-        Ok(())
+        let said = format!("{CHANGING} {stage}\n");
+        file.seek(SeekFrom::Start(0))?;
+        file.write_all(said.as_bytes())?;
+        file.set_len(said.len() as u64)?;
+        file.sync_data()
+    }
+
+    /// Says that results belong together again.
+    pub(crate) fn say_changed(&self) -> io::Result<()> {
+        self.file.set_len(0)
     }
 
     /// Removes the file of the lock from a folder that is about to go; the lock itself is held on.
     pub(crate) fn remove_file(folder: &Path) {
         let _ = fs::remove_file(folder.join(LOCK_FILE));
     }
+}
+
+/// The stage that the file of a lock names; the first of all where it says only that results change.
+fn stage_said_in(file: &mut File) -> Option<Stage> {
+    let mut said = Vec::new();
+    file.take(MAX_SAID).read_to_end(&mut said).ok()?;
+    let said = String::from_utf8_lossy(&said);
+    let (line, _) = said.split_once('\n')?;
+    let name = line.strip_prefix(CHANGING)?;
+    Some(Stage::from_name(name.trim()).unwrap_or(Stage::ALL[0]))
 }
 
 /// Whether an open file is still the one at a path.
@@ -130,14 +151,36 @@ mod tests {
     #[test]
     fn the_next_holder_knows_how_the_last_one_ended() {
         let folder = tempfile::tempdir().expect("temporary folder");
-        let was_cut_short = |says: &[bool]| {
+        let cut_short = |says: &[Option<Stage>]| {
+            let peeked = Lock::cut_short_in(folder.path());
             let lock = Lock::take(folder.path(), Patience::None).expect("a lock");
-            says.iter().for_each(|&is_changing| lock.say_changing(is_changing).expect("said"));
-            lock.was_cut_short
+            for stage in says {
+                stage.map_or_else(|| lock.say_changed(), |stage| lock.say_changing(stage)).expect("said");
+            }
+            assert_eq!(peeked, lock.cut_short);
+            lock.cut_short
         };
-        let turns: [&[bool]; 5] = [&[], &[true, false], &[true], &[], &[true, false]];
-        assert_eq!(turns.map(was_cut_short), [false, false, false, true, true]);
-        assert!(!was_cut_short(&[]));
+        let (skeleton, tree) = (Some(Stage::Skeleton), Some(Stage::Tree));
+        let turns: [&[Option<Stage>]; 7] =
+            [&[], &[tree, None], &[skeleton], &[], &[tree], &[tree, None], &[]];
+        assert_eq!(turns.map(cut_short), [None, None, None, skeleton, skeleton, tree, None]);
+    }
+
+    #[test]
+    fn a_lock_that_names_no_stage_speaks_of_all() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let cases = [
+            ("", None),
+            ("chang", None),
+            ("changing", None),
+            ("changing\n", Some(Stage::Phantom)),
+            ("changing a stage to come\n", Some(Stage::Phantom)),
+            ("changing tree\nleton\n", Some(Stage::Tree)),
+        ];
+        for (said, stage) in cases {
+            fs::write(folder.path().join(LOCK_FILE), said).expect("a file");
+            assert_eq!(Lock::cut_short_in(folder.path()), stage, "{said}");
+        }
     }
 
     #[test]

@@ -19,7 +19,7 @@ pub(super) fn of(error: &Error) -> String {
         Error::ResultInTheWay { .. } => "choose another name for the plot".to_owned(),
         Error::InputInTheWay { .. } => "choose another folder with -o".to_owned(),
         Error::FileInTheWay { .. } => {
-            "move it away, or choose another folder with -o; --force writes over it".to_owned()
+            "move it away, or choose another folder with -o; --force writes over it or removes it".to_owned()
         }
         Error::FolderInTheWay { .. } => "move it away, or choose another folder with -o".to_owned(),
         Error::Point { cause, .. } => cause.hint(),

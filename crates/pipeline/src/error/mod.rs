@@ -245,8 +245,8 @@ pub enum Error {
         /// The input.
         path: PathBuf,
     },
-    /// A file that no run has made, and that a result would be written over.
-    #[error("{path} was not made by a run here, and a result of that name would take its place", path = path.display())]
+    /// A file that no run has made, and that the run would write over, or remove as a result that does not hold any more.
+    #[error("{path} was not made by a run here, and would give way: it has the name of a result", path = path.display())]
     FileInTheWay {
         /// The file.
         path: PathBuf,

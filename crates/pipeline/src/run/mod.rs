@@ -223,6 +223,7 @@ impl Run<'_> {
             settings: settings::changed(&self.request.loaded.config, stages),
         });
         for &stage in stages {
+            folder.turn_to(stage);
             if stage == Stage::Report {
                 // It reads the inputs of all stages before, which are in place by now.
                 self.settle_kept(folder, &mut settings)?;
@@ -244,6 +245,8 @@ impl Run<'_> {
 
     /// Digests of the input's files.
     fn take_stock_of_input(&mut self, stages: &[Stage]) -> Result<(), Error> {
+        let named: Vec<PathBuf> = self.artifacts.files.values().cloned().collect();
+        self.refuse_own_input(&named, stages)?;
         let (Some(input), Some(&first)) = (&self.input, stages.first()) else { return Ok(()) };
         let files = input_files(&self.source, &self.artifacts, (first, input))?;
         self.refuse_own_input(&files, stages)?;

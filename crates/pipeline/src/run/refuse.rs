@@ -30,42 +30,46 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// No result may take the place of what it is made from.
+    /// No result may take the place of what it is made from, nor may that go as a result that does not hold any more.
     pub(super) fn refuse_own_input(&self, files: &[PathBuf], stages: &[Stage]) -> Result<(), Error> {
         let Ok(out) = std::fs::canonicalize(&self.request.out) else { return Ok(()) };
+        let changed = files_from(stages.first().copied());
         for path in files {
             let place = std::fs::canonicalize(path).ok();
             let name = place.as_ref().and_then(|place| place.strip_prefix(&out).ok()?.to_str());
-            let is_written =
-                |name: &str| stages.iter().any(|stage| stage.writes().iter().any(|own| own == name));
-            if name.is_some_and(is_written) {
+            if name.is_some_and(|name| changed.contains(name)) {
                 return Err(Error::InputInTheWay { path: path.clone() });
             }
         }
         Ok(())
     }
 
-    /// No result may take the place of a file that no run has made, unless that is asked for; of a folder in no case.
+    /// No result may take the place of a file that no run has made, unless that is asked for; of a folder in no case. A run
+    /// that ends early changes the files of the later stages too: it removes them.
     pub(super) fn refuse_to_overwrite(&self, folder: &RunFolder, stages: &[Stage]) -> Result<(), Error> {
         let beside =
             provenance::FILES.into_iter().chain(provenance::FILES_ASIDE).chain([failure::FILE, DIGEST_FILE]);
-        let written: Vec<String> =
-            stages.iter().flat_map(|stage| stage.writes()).chain(beside.map(str::to_owned)).collect();
+        let beside: BTreeSet<String> = beside.map(str::to_owned).collect();
+        let changed = files_from(stages.first().copied());
         let recorded = recorded(folder);
         // The list of somebody else's files vouches for none of ours.
         let is_list_ours = !recorded.is_empty()
             || ["stages/", "provenance/"].iter().any(|place| folder.vouches_below(place))
             || std::fs::metadata(folder.path().join(DIGEST_FILE)).is_ok_and(|list| list.len() == 0);
-        let may_write = self.request.force || folder.was_cut_short();
-        for file in written {
-            let path = folder.path().join(&file);
+        let left = folder.cut_short().map(|stage| files_from(Some(stage)));
+        let may_write = |file: &String| {
+            let is_left = left.as_ref().is_some_and(|left| left.contains(file) || beside.contains(file));
+            self.request.force || is_left
+        };
+        for file in changed.union(&beside) {
+            let path = folder.path().join(file);
             let Ok(there) = std::fs::symlink_metadata(&path) else { continue };
             if there.is_dir() {
                 return Err(Error::FolderInTheWay { path });
             }
-            let is_listed = is_list_ours && (file == DIGEST_FILE || folder.digest(&file).is_some());
+            let is_listed = is_list_ours && (file == DIGEST_FILE || folder.digest(file).is_some());
             // In folders of the names that ours have nobody else writes.
-            if !may_write && !file.contains('/') && !is_listed && !recorded.contains(&file) {
+            if !may_write(file) && !file.contains('/') && !is_listed && !recorded.contains(file) {
                 return Err(Error::FileInTheWay { path });
             }
         }
@@ -109,6 +113,11 @@ impl Run<'_> {
         let files = input_files(&self.source, &self.artifacts, (first, input))?;
         provenance::is_other_input(folder, &files)
     }
+}
+
+/// Every file that a stage or a later one may write.
+fn files_from(first: Option<Stage>) -> BTreeSet<String> {
+    Stage::ALL.into_iter().filter(|stage| Some(*stage) >= first).flat_map(Stage::writes).collect()
 }
 
 /// The files that the records in a folder name.

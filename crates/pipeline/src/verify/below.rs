@@ -33,18 +33,23 @@ pub(super) enum Found {
     Below {
         /// Those with results.
         sealed: Vec<String>,
+        /// Those with results that no list vouches for, as a run that was killed leaves them.
+        unsealed: Vec<String>,
         /// Runs that have stopped before they had one.
         unfinished: Vec<String>,
     },
 }
 
 /// Finds what there is to verify.
+///
+/// # Errors
+/// No list of results anywhere, and a folder that cannot be read.
 pub(super) fn find(folder: &Path) -> Result<Found, Error> {
     if folder.join(SUMS).exists() {
         return Ok(Found::Sealed);
     }
-    let refused = || Error::file(&folder.join(SUMS), Malformed::Absent);
-    let (mut sealed, mut unfinished) = (Vec::new(), Vec::new());
+    let refused = |place: &str| Error::file(&folder.join(place).join(SUMS), Malformed::Absent);
+    let (mut sealed, mut unsealed, mut unfinished) = (Vec::new(), Vec::new(), Vec::new());
     let mut open: Vec<(PathBuf, usize)> = vec![(PathBuf::new(), 0)];
     while let Some((place, depth)) = open.pop() {
         let path = folder.join(&place);
@@ -55,21 +60,19 @@ pub(super) fn find(folder: &Path) -> Result<Found, Error> {
             (false, true) if depth > 0 && failure::read(&path).is_some() && !path.join("stages").exists() => {
                 unfinished.push(name);
             }
-            // Results that no list vouches for.
-            (false, true) => return Err(Error::file(&path.join(SUMS), Malformed::Absent)),
-            (false, false) => {
-                let below = folders_in(&path)?;
-                let is_open = |_: &PathBuf| depth < MAX_DEPTH;
-                open.extend(below.into_iter().filter(is_open).map(|name| (place.join(name), depth + 1)));
+            (false, true) if depth > 0 => unsealed.push(name),
+            (false, true) => return Err(refused("")),
+            (false, false) if depth < MAX_DEPTH => {
+                open.extend(folders_in(&path)?.into_iter().map(|name| (place.join(name), depth + 1)));
             }
+            (false, false) => {}
         }
     }
+    [&mut sealed, &mut unsealed, &mut unfinished].into_iter().for_each(|names| names.sort());
     if sealed.is_empty() {
-        return Err(refused());
+        return Err(refused(unsealed.first().map_or("", String::as_str)));
     }
-    sealed.sort();
-    unfinished.sort();
-    Ok(Found::Below { sealed, unfinished })
+    Ok(Found::Below { sealed, unsealed, unfinished })
 }
 
 /// The names of the folders in a folder but for hidden ones.

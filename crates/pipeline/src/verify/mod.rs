@@ -24,13 +24,13 @@ use serde::Serialize;
 use thiserror::Error as ThisError;
 
 use crate::error::Error;
-use crate::folder::{hex_digest, is_absent};
+use crate::folder::{DIGEST_FILE as SUMS, hex_digest, is_absent};
 use crate::run;
-use crate::stage::Stage;
+use crate::settings::FILE as CONFIG;
+use crate::stage::{Artifact, Stage};
 use below::Found;
 
-const SUMS: &str = "SHA256SUMS";
-const CONFIG: &str = "provenance/config.resolved.toml";
+const MALFORMED: &str = "E-VERIFY-MALFORMED";
 const NODES: &str = "nodes.tsv";
 const COMPARE: &str = "compare.tsv";
 const DICTIONARY: &str = "dictionary.tsv";
@@ -132,7 +132,7 @@ enum Malformed {
 
 impl Diagnose for Malformed {
     fn code(&self) -> &'static str {
-        "E-VERIFY-MALFORMED"
+        MALFORMED
     }
 
     fn class(&self) -> Class {
@@ -160,18 +160,32 @@ pub fn verify(folder: &Path, threads: Option<usize>) -> Result<Verification, Err
             let (checks, digest) = Folder(folder).verified()?;
             Ok(Verification { folder: folder.to_owned(), checks, digest })
         }
-        Found::Below { sealed, unfinished } => {
+        Found::Below { sealed, unsealed, unfinished } => {
             let (mut checks, mut digests) = (Vec::new(), String::new());
             for name in sealed {
-                let (of_folder, digest) = Folder(&folder.join(&name)).verified()?;
+                let (of_folder, digest) = match Folder(&folder.join(&name)).verified() {
+                    // The others are looked at all the same.
+                    Err(Error::File { cause, .. }) if cause.code() == MALFORMED => {
+                        checks.push(unsealed_by(&name, cause.to_string()));
+                        continue;
+                    }
+                    verified => verified?,
+                };
                 checks.extend(of_folder.into_iter().map(|(file, check)| (format!("{name}/{file}"), check)));
                 digests += &format!("{digest}  {name}/{SUMS}\n");
             }
+            let absent = |name: &String| unsealed_by(name, Malformed::Absent.to_string());
+            checks.extend(unsealed.iter().map(absent));
             let why = "the run has not come to a result";
             checks.extend(unfinished.into_iter().map(|name| (name, Check::untested("results", "yes", why))));
             Ok(Verification { folder: folder.to_owned(), checks, digest: hex_digest(digests.as_bytes()) })
         }
     })
+}
+
+/// The claim of a folder among several whose list of results is missing or cannot be used.
+fn unsealed_by(name: &str, fault: String) -> (String, Check) {
+    (format!("{name}/{SUMS}"), Check::unless("sealed", "yes", Some(fault)))
 }
 
 /// A folder that has a `SHA256SUMS`.
@@ -212,11 +226,14 @@ struct Has {
 }
 
 /// What the checks read of a stage's results, where it was done.
-fn read_of(stage: Stage) -> &'static [&'static str] {
+fn read_of(stage: Stage) -> Vec<&'static str> {
     match stage {
-        Stage::Tree => &["tree.swc", DICTIONARY],
-        Stage::Views => &["views.json"],
-        Stage::Embed => &["embedding.json", "compare.json", NODES, COMPARE, DICTIONARY],
-        _ => &[],
+        Stage::Tree => vec![Artifact::Tree.file(), DICTIONARY],
+        Stage::Views => vec![Artifact::Views.file()],
+        Stage::Embed => {
+            let [embedding, comparison] = [Artifact::Embedding, Artifact::Comparison].map(Artifact::file);
+            vec![embedding, comparison, NODES, COMPARE, DICTIONARY]
+        }
+        _ => Vec::new(),
     }
 }
