@@ -1,6 +1,7 @@
 //! What a command has come to, printed: for people its tables, files and digest, for programs one JSON object.
 //!
 //! **Guarantees** standard output of a command that was told `--json` is one JSON text: no table, no other line.
+//! Only `completions` prints its script and `config init` its TOML all the same.
 
 use espalier_pipeline::{Plan, Reason, Summary};
 use serde_json::{Value, json};

@@ -137,8 +137,8 @@ fn constants(stage: Stage) -> [PerSize; 2] {
         Stage::Embed => [PerSize { fixed: 0.01, searched: 8e-4, ..none }, PerSize { node: 2000.0, ..none }],
         Stage::Render => [
             PerSize { fixed: 0.05, node: 1e-4, pixel: 1.3e-7, organ_pixel: 4.5e-7, ..none },
-            // Of three organs at 1600 and 4096 pixels, with and without the figure: 0.8 to 1.1, and up to 1.7 for
-            // one that leaves most of its page empty.
+            // Estimate to measured peak, of three organs at 1600 and 4096 pixels, with and without the figure: 0.8
+            // to 1.1, and up to 1.7 for one that leaves most of its page empty.
             PerSize { fixed: 20e6, foreground: 60.0, node: 1000.0, pixel: 11.0, organ_pixel: 14.0, ..none },
         ],
         Stage::Report => [

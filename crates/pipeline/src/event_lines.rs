@@ -181,7 +181,7 @@ pub enum Line {
         /// The stages whose results were made in this run and are in place.
         done: Vec<String>,
     },
-    /// The program ends with an error: the last line.
+    /// The program ends with an error: the last line. One more may stand before it: that results could not be printed.
     Failed(Failure),
 }
 

@@ -64,9 +64,9 @@ impl Labels {
     }
 
     /// The labels with a value in place of each name, by names that the user gave; and a sentence for each name. A name
-    /// is looked for as it is written, then with capitals, spaces, hyphens and underscores all one; where several values
-    /// have it, it stands for all of them. What commas part may be one name with commas in it: of labels in a row the
-    /// most that are a name together are taken for it.
+    /// is looked for as it is written, then without regard to capitals, and spaces, hyphens, underscores and commas all
+    /// one; where several values have it, it stands for all of them. What commas part may be one name with commas in
+    /// it: of labels in a row the most that are a name together are taken for it.
     ///
     /// # Errors
     /// [`Error::NotNamed`] for a name that is not among them, with those that are nearest.

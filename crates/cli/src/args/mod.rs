@@ -128,7 +128,7 @@ pub(crate) struct Common {
     /// happens, as espalier info --events describes them; the last one of a command that fails says why
     #[arg(long, global = true)]
     pub(crate) json: bool,
-    /// Print results, warnings and errors only
+    /// Print results, warnings, remarks and errors only, and that a run waits for another
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
     /// Say more: the settings that are not at their default, and why a stage is done; -vv also what each stage counted,

@@ -1,6 +1,7 @@
 //! The command that does one scan alone: as it would be typed, and as a page may show it that is given away.
 //!
-//! **Guarantees** it has the settings and options of the call that it was made in, so that it does what that call would.
+//! **Guarantees** it has the settings and options of the call that it was made in, so that it does what that call would;
+//! `--force` is not repeated: what stages that were done have left is kept.
 
 use std::path::{Path, PathBuf};
 
