@@ -30,7 +30,6 @@ use crate::settings::FILE as CONFIG;
 use crate::stage::{Artifact, Stage};
 use below::Found;
 
-const MALFORMED: &str = "E-VERIFY-MALFORMED";
 const NODES: &str = "nodes.tsv";
 const COMPARE: &str = "compare.tsv";
 const DICTIONARY: &str = "dictionary.tsv";
@@ -132,7 +131,7 @@ enum Malformed {
 
 impl Diagnose for Malformed {
     fn code(&self) -> &'static str {
-        MALFORMED
+        "E-VERIFY-MALFORMED"
     }
 
     fn class(&self) -> Class {
@@ -165,7 +164,7 @@ pub fn verify(folder: &Path, threads: Option<usize>) -> Result<Verification, Err
             for name in sealed {
                 let (of_folder, digest) = match Folder(&folder.join(&name)).verified() {
                     // The others are looked at all the same.
-                    Err(Error::File { cause, .. }) if cause.code() == MALFORMED => {
+                    Err(Error::File { cause, .. }) if cause.code() == Malformed::Empty.code() => {
                         checks.push(unsealed_by(&name, cause.to_string()));
                         continue;
                     }
