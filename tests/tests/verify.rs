@@ -310,8 +310,12 @@ fn folders_of_runs_and_of_pages_are_verified() {
     assert_eq!(failures(folder.path()), ["runs/b/planar.svg: sha256"]);
     fs::write(at("group/group.tsv"), "label\n").expect("write");
     assert!(failures(&at("group")).contains(&"group.tsv: sha256".to_owned()));
-    // Results whose list is gone are no reason to look elsewhere.
+    // Results whose list is gone do not hold, and the others are looked at all the same.
     fs::remove_file(at("runs/a/SHA256SUMS")).expect("remove");
-    let error = verify(folder.path(), Some(1)).expect_err("results without a list");
+    let failed = failures(folder.path());
+    assert!(failed.contains(&"runs/a/SHA256SUMS: sealed".to_owned()), "{failed:?}");
+    assert!(failed.contains(&"runs/b/planar.svg: sha256".to_owned()), "{failed:?}");
+    // Of one folder there is nothing else to look at.
+    let error = verify(&at("runs/a"), Some(1)).expect_err("results without a list");
     assert!(error.file().is_some_and(|file| file.ends_with("runs/a/SHA256SUMS")), "{error}");
 }

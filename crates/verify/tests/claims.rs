@@ -50,8 +50,9 @@ fn failures(tree: &Tree, (views, embedding): (&ViewHierarchy, &Embedding), param
     checks.push(check_nodes_table(&embedding.nodes_tsv(tree), tree, embedding));
     let compare = espalier_model::MethodRow::to_tsv(&embedding.methods);
     checks.push(check_compare_table(&compare, &embedding.methods));
-    let untested =
-        checks.iter().find(|check| check.outcome == Outcome::Untested && check.name != "never worse");
+    // The rotation was that of a layout that is not written.
+    let may_be = |name: &str| ["never worse", "pose: rotation"].contains(&name);
+    let untested = checks.iter().find(|check| check.outcome == Outcome::Untested && !may_be(&check.name));
     assert!(untested.is_none(), "{untested:?}");
     checks
         .iter()
