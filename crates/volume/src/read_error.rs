@@ -9,6 +9,9 @@ use thiserror::Error;
 
 use crate::dicom::DicomError;
 
+/// How many characters of what a file says are shown: its words may be of any length.
+const N_SHOWN: usize = 300;
+
 /// What is wrong with a file.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -91,13 +94,13 @@ pub enum ReadError {
         limit: usize,
     },
     /// A header that names a data file outside its folder.
-    #[error("the header names the data file {written:?}, which is not in its folder")]
+    #[error("the header names the data file {:?}, which is not in its folder", brief(.written))]
     Escape {
         /// The name as written.
         written: String,
     },
     /// Voxels in more than one file.
-    #[error("the header spreads its voxels over several files: {written:?}")]
+    #[error("the header spreads its voxels over several files: {:?}", brief(.written))]
     SeveralFiles {
         /// What it says.
         written: String,
@@ -111,7 +114,7 @@ pub enum ReadError {
         name: &'static str,
     },
     /// A fault of the file that holds the voxels of a header.
-    #[error("in its data file {}: {problem}", .path.display())]
+    #[error("in its data file {}: {problem}", brief(&.path.to_string_lossy()))]
     Detached {
         /// What is wrong with it.
         problem: Box<ReadError>,
@@ -119,7 +122,7 @@ pub enum ReadError {
         path: PathBuf,
     },
     /// A header field out of its range.
-    #[error("header field {field} is {found}, expected {expected}")]
+    #[error("header field {field} is {}, expected {expected}", brief(.found))]
     Field {
         /// The name of the field in the format's own words.
         field: &'static str,
@@ -162,7 +165,7 @@ pub enum ReadError {
         readings: &'static str,
     },
     /// The numbers that place the volume in space are no legal transform.
-    #[error("the {form} cannot be used: {problem}")]
+    #[error("the {form} cannot be used: {}", brief(.problem))]
     Form {
         /// Which numbers.
         form: &'static str,
@@ -177,6 +180,14 @@ pub enum ReadError {
         /// What is wrong with them.
         problem: GridError,
     },
+}
+
+/// The beginning of a text, with a mark where it was cut.
+fn brief(text: &str) -> String {
+    match text.char_indices().nth(N_SHOWN) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
+    }
 }
 
 impl ReadError {
@@ -273,5 +284,26 @@ impl Diagnose for ReadError {
             }
         }
         .to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_file_says_is_cut_in_messages() {
+        let long = "aé".repeat(100_000);
+        let field = ReadError::Field { field: "line", found: long.clone(), expected: "a number" };
+        let detached = ReadError::Detached { problem: Box::new(field), path: long.clone().into() };
+        for error in [
+            detached,
+            ReadError::Escape { written: long.clone() },
+            ReadError::SeveralFiles { written: long.clone() },
+            ReadError::Form { form: "sform", problem: long },
+        ] {
+            let text = error.to_string();
+            assert!(text.len() < 2000 && text.contains("aéaé") && text.contains('…'), "{text:.100}");
+        }
     }
 }
