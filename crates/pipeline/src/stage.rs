@@ -118,7 +118,8 @@ impl Stage {
             Self::Phantom | Self::Views => 1,
             Self::Radius => 2,
             Self::Skeleton | Self::Tree => 3,
-            Self::Volume | Self::Embed | Self::Render | Self::Report => 4,
+            Self::Embed | Self::Render | Self::Report => 4,
+            Self::Volume => 5,
         }
     }
 

@@ -49,7 +49,7 @@ impl Publication {
 
 const TVCG: (&str, &str) = ("journal", "IEEE Transactions on Visualization and Computer Graphics");
 
-const ALL: [Publication; 15] = [
+const ALL: [Publication; 16] = [
     Publication {
         key: "Hu2022",
         kind: "article",
@@ -99,6 +99,16 @@ const ALL: [Publication; 15] = [
         venue: ("booktitle", "Proceedings of the International Conference on Pattern Recognition"),
         place: &[("volume", "3"), ("pages", "528--532")],
         year: "1996",
+    },
+    Publication {
+        key: "Ridler1978",
+        kind: "article",
+        short: "Ridler and Calvard 1978",
+        authors: "Ridler, T. W. and Calvard, S.",
+        title: "Picture thresholding using an iterative selection method",
+        venue: ("journal", "IEEE Transactions on Systems, Man, and Cybernetics"),
+        place: &[("volume", "8"), ("number", "8"), ("pages", "630--632")],
+        year: "1978",
     },
     Publication {
         key: "Adams1994",

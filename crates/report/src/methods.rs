@@ -90,7 +90,15 @@ fn selection(facts: &Facts<'_>) -> Vec<String> {
     if was_found {
         sentences.push("The seed was found in the trachea.".to_owned());
     }
-    if count("stable_threshold").is_some() && setting("volume.lower").or(setting("volume.upper")).is_none() {
+    let is_found = setting("volume.lower").or(setting("volume.upper")).is_none();
+    let half = count("half_maximum").filter(|&half| count("band_lower") == Some(half));
+    if let (Some(_), Some(inside), Some(outside)) = (half, count("value_inside"), count("value_outside")) {
+        sentences.push(format!(
+            "The threshold is half-way between the medians of the values inside, {}, and outside, {} [Ridler1978].",
+            number(inside, 5),
+            number(outside, 5)
+        ));
+    } else if count("stable_threshold").is_some() && is_found {
         sentences.push(
             "The threshold is the last before the region leaks through the wall [Mori1996].".to_owned(),
         );

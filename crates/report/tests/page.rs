@@ -314,6 +314,19 @@ fn the_methods_say_how_the_mask_was_chosen() {
             "with values up to -863 [@Adams1994]. The seed was found in the trachea. The threshold is the last before",
         ),
         (
+            written(
+                &[
+                    ("band_lower", 156.0),
+                    ("half_maximum", 156.0),
+                    ("value_inside", 210.0),
+                    ("value_outside", 102.0),
+                    ("stable_threshold", 129.0),
+                ],
+                &[("volume.seed_voxel", "[1, 2, 3]")],
+            ),
+            "half-way between the medians of the values inside, 210, and outside, 102 [@Ridler1978].",
+        ),
+        (
             written(&[("band_lower", 1.0), ("band_upper", 2.0)], &[("volume.seed_voxel", "[1, 2, 3]")]),
             "grown from a seed over 6-connected voxels with values from 1 to 2 [@Adams1994].",
         ),

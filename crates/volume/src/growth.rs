@@ -15,7 +15,9 @@
 //! **Cost** O(voxels reached + levels) time, a bit a voxel and the region's border in memory.
 
 use espalier_model::table::{Column, Table, fixed};
-use espalier_model::{Bits, Volume};
+use espalier_model::{Bits, Volume, Voxels};
+
+use crate::half_maximum::HalfMaximum;
 
 /// Over how many levels growth is measured. On the real CTs at hand a wall gives way within one.
 const WINDOW: usize = 5;
@@ -27,10 +29,12 @@ const CALM: f64 = 1.10;
 /// a speck of noise or mucus, adds less than what was there.
 const LEAK: f64 = 2.0;
 /// A region of fewer voxels is never taken for a lumen: a patch of noise can be calm by chance.
-const MIN_VOXELS: usize = 1000;
+pub(crate) const MIN_VOXELS: usize = 1000;
 /// After a leak the flood goes on for so many levels, or until the region is so many times the stable one.
 const AFTERMATH_LEVELS: usize = 25;
 const AFTERMATH_GROWTH: usize = 6;
+/// Where all values are whole, so many of them make a curve of whole steps.
+const WHOLE_WAY: f64 = 25.0;
 /// The most levels, so that thresholds in any unit cost little.
 const MAX_LEVELS: f64 = 4096.0;
 
@@ -75,6 +79,9 @@ pub struct Growth {
     pub knee: Knee,
     /// The volume of a voxel in ml.
     pub voxel_ml: f64,
+    /// Where a lumen's edge is, if that was looked for and found.
+    pub half_maximum: Option<HalfMaximum>,
+    scale: Scale,
 }
 
 /// The columns of `growth.tsv`.
@@ -85,14 +92,19 @@ pub const GROWTH_COLUMNS: [Column; 4] = [
     Column::new(
         "state",
         "n/a",
-        "stable: the last threshold before the leak; leak: from it on the region leaks",
+        "half: half-way from the values inside to those outside, to which vessels grow; stable: the last threshold \
+         before the leak; leak: from it on the region leaks",
     ),
 ];
 
 impl Growth {
-    /// The threshold to grow to: the stable one, or the last if nothing leaks.
+    /// The threshold to grow to: half-way from inside to outside if that was looked for and found, else the stable
+    /// one, or the last if nothing leaks.
     #[must_use]
     pub fn threshold(&self) -> Option<f64> {
+        if let Some(level) = self.half_level() {
+            return Some(level.threshold);
+        }
         match self.knee {
             Knee::Leak { stable } => self.levels.get(stable).map(|level| level.threshold),
             Knee::None => self.levels.last().map(|level| level.threshold),
@@ -109,6 +121,12 @@ impl Growth {
         }
     }
 
+    /// The level half-way from inside to outside, or the last before a leak that comes earlier.
+    #[must_use]
+    pub fn half_level(&self) -> Option<Level> {
+        self.levels.get(self.half_maximum?.level?).copied()
+    }
+
     /// Whether the region is too small for a leak to be told from noise.
     #[must_use]
     pub fn is_small(&self) -> bool {
@@ -121,6 +139,17 @@ impl Growth {
         level.n_voxels as f64 * self.voxel_ml
     }
 
+    /// The level that a value needs, also beyond the curve's ends; not of NaN.
+    pub(crate) fn level_of(&self, value: f64) -> Option<i64> {
+        let above = self.scale.above(value);
+        (!above.is_nan()).then_some(above as i64)
+    }
+
+    /// The value at a level, also beyond the curve's ends.
+    pub(crate) fn value(&self, level: i64) -> f64 {
+        self.scale.threshold(level as f64)
+    }
+
     /// The table `growth.tsv`.
     #[must_use]
     pub fn to_tsv(&self) -> String {
@@ -130,7 +159,9 @@ impl Growth {
             Knee::None | Knee::NeverCalm => usize::MAX,
         };
         for (level_idx, level) in self.levels.iter().enumerate() {
+            let half = self.half_maximum.and_then(|half| half.level);
             let state = match level_idx {
+                idx if half == Some(idx) && idx != stable => "half",
                 idx if idx == stable => "stable",
                 idx if idx > stable => "leak",
                 _ => "",
@@ -150,11 +181,13 @@ pub(crate) fn measure(volume: &Volume, seed: [usize; 3], towards: Towards, limit
         levels: Vec::new(),
         knee: Knee::NeverCalm,
         voxel_ml: volume.grid().voxel_volume_mm3() / 1000.0,
+        half_maximum: None,
+        scale,
     };
     let mut last_calm = None;
     for level in 0..flood.queues.len() {
         flood.drain(level);
-        growth.levels.push(Level { threshold: scale.threshold(level), n_voxels: flood.n_reached });
+        growth.levels.push(Level { threshold: scale.threshold(level as f64), n_voxels: flood.n_reached });
         if let Knee::Leak { stable } = growth.knee {
             let is_plain = flood.n_reached > AFTERMATH_GROWTH * growth.levels[stable].n_voxels;
             if is_plain || level > stable + AFTERMATH_LEVELS {
@@ -182,8 +215,24 @@ fn is_calm(levels: &[Level]) -> bool {
     before >= MIN_VOXELS && now as f64 <= CALM * before as f64
 }
 
+/// The voxels of the region at one level.
+pub(crate) fn region_at(volume: &Volume, seed: [usize; 3], growth: &Growth, level: usize) -> Bits {
+    let scale = growth.scale;
+    let only = Scale { origin: scale.origin + level as f64 * scale.step, n_levels: 1, ..scale };
+    let mut flood = Flood::new(volume, only, seed);
+    flood.drain(0);
+    flood.is_seen
+}
+
+/// Whether every value is a whole number, so that no threshold between two of them makes a difference.
+fn has_whole_values(volume: &Volume) -> bool {
+    let (slope, intercept) = volume.scaling();
+    let is_stored_whole = !matches!(volume.voxels(), Voxels::F32(_) | Voxels::F64(_));
+    is_stored_whole && slope.fract() == 0.0 && intercept.fract() == 0.0
+}
+
 /// Levels of thresholds.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Scale {
     /// +1 where the threshold rises, −1 where it falls.
     sign: f64,
@@ -209,23 +258,29 @@ impl Scale {
         let end = end.min(sign * limit).max(start);
         // Whole HU for a CT; a thousandth of the way for values on another scale.
         let way = end - start;
-        let step = if way >= 100.0 { 1.0_f64.max((way / MAX_LEVELS).ceil()) } else { way / 1000.0 };
+        let is_whole = way >= if has_whole_values(volume) { WHOLE_WAY } else { 100.0 };
+        let step = if is_whole { 1.0_f64.max((way / MAX_LEVELS).ceil()) } else { way / 1000.0 };
         let step = if step > 0.0 { step } else { 1.0 };
         let origin = if step >= 1.0 { (start / step).ceil() * step } else { start };
         let n_levels = (((end - origin) / step).floor().max(0.0) as usize).min(2 * MAX_LEVELS as usize) + 1;
         Self { sign, origin, step, n_levels }
     }
 
-    fn threshold(&self, level: usize) -> f64 {
+    fn threshold(&self, level: f64) -> f64 {
         // Adding 0 makes −0 a plain 0.
-        self.sign * (self.origin + level as f64 * self.step) + 0.0
+        self.sign * (self.origin + level * self.step) + 0.0
     }
 
     /// The level at which a voxel of this value enters the band.
     fn level(&self, value: f64) -> Option<usize> {
-        let above = ((self.sign * value - self.origin) / self.step).ceil();
+        let above = self.above(value);
         // False for NaN.
         (above < self.n_levels as f64).then_some(above.max(0.0) as usize)
+    }
+
+    /// The same, negative for values before the seed's, and as large as it takes.
+    fn above(&self, value: f64) -> f64 {
+        ((self.sign * value - self.origin) / self.step).ceil()
     }
 }
 

@@ -57,6 +57,7 @@ mod read;
 
 mod choose;
 mod growth;
+mod half_maximum;
 mod kind;
 mod labels;
 mod region_grow;
@@ -90,6 +91,7 @@ pub use crop::{Cropped, read_box};
 pub use dicom::{DicomError, Irregularity, Listed, Obstacle, is_dicom_folder};
 pub use error::Error;
 pub use growth::{GROWTH_COLUMNS, Growth, Knee, Level, Towards};
+pub use half_maximum::HalfMaximum;
 pub use kind::{Kind, check_regions, inspect_kind};
 pub use labels::{Label, Labels};
 pub use options::{AssumedSpace, ReadOptions};

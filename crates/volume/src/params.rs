@@ -18,8 +18,9 @@ use crate::spacing::Spacing;
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
     /// What a scan shows, where nothing else is said: `"airway"` grows from the trachea, which it finds by itself, up
-    /// to the last threshold before the region leaks into the lung; `"vessel"` grows from a seed down to the last
-    /// threshold before it leaks, or without a seed takes all from 150 HU on (vessels with contrast, and bone).
+    /// to the last threshold before the region leaks into the lung; `"vessel"` grows from a seed down to half-way
+    /// between the values inside and those a few voxels outside, which it finds by itself, and never beyond a leak, or
+    /// without a seed takes all from 150 HU on (vessels with contrast, and bone).
     /// Default: none, so that a scan is refused until a method is given. Keys that are set stay as they are; a mask
     /// or a label map needs no preset and heeds none.
     #[serde(skip_serializing_if = "Option::is_none")]

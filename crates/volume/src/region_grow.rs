@@ -2,8 +2,9 @@
 //!
 //! **Input** a volume, a seed voxel, a band of values; with a preset, both can be left open. **Output** one bit a
 //! voxel, and how the region grew.
-//! **Steps** 0. find the seed and the band's end where they are open; 1. choose the voxels that lie in the band, ends included; 2. label their components by faces
-//! (6-connected); 3. keep the seed's.
+//! **Steps** 0. find the seed and the band's end where they are open: of airways the last threshold before the leak, of
+//! vessels half-way from the values inside to those outside; 1. choose the voxels that lie in the band, ends
+//! included; 2. label their components by faces (6-connected); 3. keep the seed's.
 //! **Guarantees** the result is the 6-connected component of the band that holds the seed. No recursion.
 //! **Why not 26-connected?** An airway's wall is thinner than a voxel in places; over edges and corners the
 //! region leaks into the lung at the very same threshold.
@@ -18,7 +19,7 @@ use crate::kind::Census;
 use crate::runs::{Connectivity, Runs};
 use crate::select::Selection;
 use crate::trachea::SeedCandidate;
-use crate::{Error, Params, Preset, growth, trachea};
+use crate::{Error, Params, Preset, growth, half_maximum, trachea};
 
 /// The seed of the parameters as a voxel inside the grid.
 pub(crate) fn seed_voxel(grid: &Grid, params: &Params) -> Result<[usize; 3], Error> {
@@ -72,7 +73,7 @@ fn choose_seed(
     Ok((best.voxel, candidates))
 }
 
-/// The band of the parameters; of an end that is not given, what lies before the leak.
+/// The band of the parameters; of an end that is not given, what the growth tells.
 fn choose_band(
     volume: &Volume,
     params: &Params,
@@ -100,14 +101,23 @@ fn choose_band(
     if !(open_lower..=open_upper).contains(&value) {
         return Err(seed_error(volume, seed, (open_lower, open_upper)));
     }
-    let growth = growth::measure(volume, seed, towards, limit);
+    let mut growth = growth::measure(volume, seed, towards, limit);
+    if !is_given && towards == Towards::Dark {
+        growth.half_maximum = half_maximum::find(volume, seed, &growth);
+    }
     count(&growth, report);
     if is_given {
         warn_of_leak(&growth, limit, report);
         return Ok((Some(growth), band));
     }
-    let threshold = growth.threshold().ok_or_else(|| no_knee(&growth))?;
-    warn_of_no_leak(&growth, limit, report);
+    let threshold = match growth.half_maximum {
+        // The seed is darker than most of the lumen: a speck of noise, or outside of it.
+        Some(half) if half.level.is_none() => half.threshold,
+        _ => growth.threshold().ok_or_else(|| no_knee(&growth))?,
+    };
+    if growth.half_maximum.is_none() {
+        warn_of_no_leak(&growth, limit, report);
+    }
     let band = match towards {
         Towards::Bright => (band.0, threshold),
         Towards::Dark => (threshold, band.1),
@@ -121,6 +131,11 @@ fn count(growth: &Growth, report: &mut Report) {
         report.count("stable_ml", growth.ml(stable));
         report.count("leaking_threshold", leaking.threshold);
         report.count("leaking_ml", growth.ml(leaking));
+    }
+    if let Some(half) = growth.half_maximum {
+        report.count("value_inside", half.inside);
+        report.count("value_outside", half.outside);
+        report.count("half_maximum", half.threshold);
     }
 }
 

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use espalier_model::{GridError, Ledger, Mask, nifti_out};
+use espalier_volume::Growth;
 
 use super::{Outcome, Step, describe_grid};
 use crate::error::Error;
@@ -28,9 +29,7 @@ pub(super) fn volume(step: &mut Step<'_>) -> Result<Outcome, Error> {
     if n_dropped > 0.0 {
         line = format!("{line}; {n_dropped} components dropped");
     }
-    if let Some((stable, leaking)) = segmented.growth.as_ref().and_then(espalier_volume::Growth::leak) {
-        line = format!("{line}; it leaks at {}, {} is the last before", leaking.threshold, stable.threshold);
-    }
+    line.extend(segmented.growth.as_ref().map(said_of_growth));
     let mut report = segmented.report;
     let slices = page::slices(step, &mask, &mut report)?;
     if let Some(left) = report.get("tunnels_left") {
@@ -49,6 +48,21 @@ pub(super) fn volume(step: &mut Step<'_>) -> Result<Outcome, Error> {
     files.extend(slices);
     step.artifacts.mask = Some(Arc::new(mask));
     Ok(Outcome { files, report, line })
+}
+
+/// Where a region that grew has ended, and why there.
+fn said_of_growth(growth: &Growth) -> String {
+    let half = growth.half_maximum.zip(growth.half_level()).map(|(half, level)| {
+        let (inside, outside) = (half.inside, half.outside);
+        format!(
+            "; grown to {}, half-way from {inside} inside to {outside} outside is {}",
+            level.threshold, half.threshold
+        )
+    });
+    let leak = growth.leak().map(|(stable, leaking)| {
+        format!("; it leaks at {}, {} is the last before", leaking.threshold, stable.threshold)
+    });
+    half.unwrap_or_default() + &leak.unwrap_or_default()
 }
 
 /// The mask on its grid as a later stage would read it from the file.
