@@ -28,6 +28,17 @@ fn a_vessel_tree_is_found() {
     }
 }
 
+/// Radii in noisy CT reach to the wall: the mask of airways, grown in a band that does not leak, ends before it.
+#[test]
+fn radii_in_a_scan_reach_to_its_walls() {
+    for kind in [Kind::Airway, Kind::Vessel] {
+        let measured =
+            measure(&Case { kind, spacing_mm: [1.5; 3], scan: Scan::Ct, seed: 7 }).expect("a tree");
+        let score = measured.score;
+        assert!(score.radius_bias_voxels.abs() <= 0.15 && score.radius_mae_voxels <= 0.2, "{measured}");
+    }
+}
+
 /// The centreline and its radii, of a program that works on the surface. Where the section is not quite round, our radius
 /// is that of its area, VMTK's that of the sphere inside: the ratio is judged by its median.
 #[test]

@@ -5,7 +5,8 @@
 //! `sqrt` is exact by IEEE 754, so the inherent method may be used everywhere.
 
 pub use libm::{
-    acos, asin, atan, atan2, cbrt, ceil, cos, exp, floor, hypot, log as ln, log2, log10, pow, sin, tan,
+    acos, asin, atan, atan2, cbrt, ceil, cos, erf, erfc, exp, floor, hypot, log as ln, log2, log10, pow, sin,
+    tan,
 };
 
 /// Sine and cosine of an angle in radians.

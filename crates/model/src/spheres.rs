@@ -6,10 +6,10 @@ use crate::FileError;
 use crate::table::{Column, Table};
 
 const FORMAT: &str = "espalier-spheres";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// The columns of `spheres.tsv`.
-pub const SPHERE_COLUMNS: [Column; 8] = [
+pub const SPHERE_COLUMNS: [Column; 9] = [
     Column::new("sphere", "n/a", "index of the sphere: that of its skeleton voxel"),
     Column::new("x_mm", "mm", "centre in space, RAS+: towards the right"),
     Column::new("y_mm", "mm", "centre: towards the front"),
@@ -18,13 +18,18 @@ pub const SPHERE_COLUMNS: [Column; 8] = [
     Column::new("distance_mm", "mm", "distance from the voxel's own centre to the nearest background centre"),
     Column::new("area_radius_mm", "mm", "radius of the circle with the area of the cross-section"),
     Column::new(
+        "wall_mm",
+        "mm",
+        "how far beyond the mask's surface the scan shows the wall, negative inside; 0 where no scan was looked at",
+    ),
+    Column::new(
         "is_cut",
         "n/a",
         "1 if the border of the scan cuts the sphere, so that its radius is a lower bound",
     ),
 ];
-const COLUMNS: [&str; 8] = {
-    let mut names = [""; 8];
+const COLUMNS: [&str; 9] = {
+    let mut names = [""; 9];
     let mut column = 0;
     while column < names.len() {
         names[column] = SPHERE_COLUMNS[column].name;
@@ -45,6 +50,9 @@ pub struct Sphere {
     /// The radius of the circle with the area of the mask's cross-section here, in mm; `NaN` where the section
     /// has no clear direction.
     pub area_radius_mm: f64,
+    /// How far beyond the mask's surface the scan shows the wall, in mm, negative inside; 0 where no scan was looked at. Not
+    /// less than `-radius_mm`.
+    pub wall_mm: f64,
     /// Whether the sphere touches the border of the scan, so that its radius is a lower bound.
     pub is_cut: bool,
 }
@@ -71,6 +79,7 @@ impl InscribedSpheres {
                 &sphere.radius_mm,
                 &sphere.distance_mm,
                 &area_radius.map_or_else(|| "n/a".to_owned(), |radius| radius.to_string()),
+                &sphere.wall_mm,
                 &u8::from(sphere.is_cut),
             ]);
         }
@@ -126,7 +135,8 @@ fn read_sphere(line: &str) -> Result<Sphere, String> {
         radius_mm: length(4)?,
         distance_mm: length(5)?,
         area_radius_mm: if cells[6] == "n/a" { f64::NAN } else { length(6)? },
-        is_cut: match cells[7] {
+        wall_mm: number(7)?.max(-length(4)?),
+        is_cut: match cells[8] {
             "0" => false,
             "1" => true,
             other => return Err(format!("is_cut is neither 0 nor 1: {other:.40}")),
@@ -140,7 +150,14 @@ mod tests {
 
     fn sphere(radius_mm: f64, area_radius_mm: f64) -> Sphere {
         let center_mm = DVec3::new(-0.1, 1.0 / 3.0, 1.6e-5);
-        Sphere { center_mm, radius_mm, distance_mm: 2.0_f64.sqrt(), area_radius_mm, is_cut: radius_mm > 1.0 }
+        Sphere {
+            center_mm,
+            radius_mm,
+            distance_mm: 2.0_f64.sqrt(),
+            area_radius_mm,
+            wall_mm: -0.25 * radius_mm,
+            is_cut: radius_mm > 1.0,
+        }
     }
 
     #[test]
@@ -158,9 +175,9 @@ mod tests {
         let good = InscribedSpheres(vec![sphere(0.5, 0.5)]).to_tsv();
         for (bad, message) in [
             (String::new(), "format unknown version 0"),
-            (good.replace("spheres 1", "spheres 2"), "version 2, expected"),
+            (good.replace("spheres 2", "spheres 1"), "version 1, expected"),
             (good.replace("radius_mm\t", "radius\t"), "line 2: the columns must be"),
-            (good.replace("\t0\n", "\n"), "line 3: 7 cells where 8 belong"),
+            (good.replace("\t0\n", "\n"), "line 3: 8 cells where 9 belong"),
             (good.replace("\t0.5\t", "\tinf\t"), "radius_mm is not a finite number: inf"),
             (good.replace("\t0.5\t", "\t-0.5\t"), "radius_mm is negative: -0.5"),
             (good.replace("\t0\n", "\tno\n"), "is_cut is neither 0 nor 1: no"),

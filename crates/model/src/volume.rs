@@ -1,5 +1,6 @@
 //! A scalar volume: CT, label map or mask as it stands in a file.
 
+use glam::DVec3;
 use ndarray::Array3;
 
 use crate::Grid;
@@ -95,6 +96,30 @@ impl Volume {
     pub fn value(&self, index: usize) -> f64 {
         let stored = with_array!(&self.voxels, a => a.as_slice().map_or(f64::NAN, |s| s[index] as f64));
         self.slope * stored + self.intercept
+    }
+
+    /// The scaled value at a point in voxels, linear between the eight centres around it. Half a voxel beyond the outermost
+    /// centres the outermost value stands, farther out there is none; nor is there where a centre that counts has no number.
+    #[must_use]
+    pub fn between(&self, voxel: DVec3) -> Option<f64> {
+        self.grid.voxel_at(voxel)?;
+        let shape = self.grid.shape();
+        let (mut low, mut share) = ([0_usize; 3], [0.0; 3]);
+        for axis in 0..3 {
+            let place = voxel[axis].clamp(0.0, (shape[axis] - 1) as f64);
+            low[axis] = (place as usize).min(shape[axis].saturating_sub(2));
+            share[axis] = place - low[axis] as f64;
+        }
+        let mut sum = 0.0;
+        for corner in 0..8 {
+            let side = [corner & 1, corner >> 1 & 1, corner >> 2];
+            let weight: f64 =
+                (0..3).map(|axis| if side[axis] == 1 { share[axis] } else { 1.0 - share[axis] }).product();
+            if weight > 0.0 {
+                sum += weight * self.value(self.grid.index([0, 1, 2].map(|axis| low[axis] + side[axis])));
+            }
+        }
+        sum.is_finite().then_some(sum)
     }
 
     /// Calls `visit` with each scaled value in storage order (x fastest, z slowest).

@@ -114,14 +114,14 @@ impl Artifacts {
             .map_err(|error| Error::stage(lookup.stage)(Box::new(error)))
     }
 
-    /// What the scan has between two corners of the world, RAS+ mm: of the file that the config names for the map, else
-    /// of the run's own input; with its path.
-    pub(crate) fn scan_of_map(
+    /// What a scan has between two corners of the world, RAS+ mm: the one that the config names beside the input, else the
+    /// run's own input; with its path.
+    pub(crate) fn scan_in_box(
         &self,
         lookup: Lookup<'_>,
-        corners_mm: [DVec3; 2],
+        (side, corners_mm): (SideFile, [DVec3; 2]),
     ) -> Result<(espalier_volume::Cropped, PathBuf), Error> {
-        let side = self.side_paths.get(&SideFile::Image);
+        let side = self.side_paths.get(&side);
         let (path, options) = match side {
             Some(path) => (path.clone(), self.beside_options()),
             None => (self.locate(Artifact::Volume, lookup)?, self.read_options),
@@ -139,7 +139,7 @@ impl Artifacts {
     /// with its data; none if there is none.
     pub(crate) fn files_beside(&self, side: SideFile, stage: Stage) -> Result<Vec<PathBuf>, Error> {
         let Some(path) = self.side_paths.get(&side) else { return Ok(Vec::new()) };
-        if !matches!(side, SideFile::Image | SideFile::Labels) {
+        if !side.is_volume() {
             return Ok(vec![path.clone()]);
         }
         espalier_volume::files(path, &self.beside_options())

@@ -27,6 +27,8 @@ pub struct Sizes {
     pub foreground: u64,
     /// Voxels of the box around the organ.
     pub boxed: u64,
+    /// Voxels of the part of the scan in which walls are looked for; 0 where radii keep to the mask.
+    pub sampled: u64,
     /// Voxels of the skeleton.
     pub skeleton: u64,
     /// Nodes of the tree.
@@ -66,6 +68,10 @@ struct PerSize {
     grown: f64,
     foreground: f64,
     boxed: f64,
+    /// A voxel of [`Sizes::sampled`].
+    sampled: f64,
+    /// A voxel of an organ whose walls are looked for.
+    walled: f64,
     node: f64,
     /// A unit of nodes to the power of [`SEARCH_POWER`].
     searched: f64,
@@ -88,6 +94,8 @@ impl PerSize {
         grown: 0.0,
         foreground: 0.0,
         boxed: 0.0,
+        sampled: 0.0,
+        walled: 0.0,
         node: 0.0,
         searched: 0.0,
         pixel: 0.0,
@@ -98,6 +106,7 @@ impl PerSize {
         let [voxels, foreground, nodes, pixels] =
             [sizes.voxels, sizes.foreground, sizes.nodes, sizes.pixels].map(|size| size as f64);
         let grown = if sizes.held_bytes > 0 { foreground } else { 0.0 };
+        let walled = if sizes.sampled > 0 { foreground } else { 0.0 };
         let organ_pixels = if foreground > 0.0 { sizes.figure_pixels as f64 } else { 0.0 };
         self.fixed
             + self.voxel * voxels
@@ -105,6 +114,8 @@ impl PerSize {
             + self.grown * grown
             + self.foreground * foreground
             + self.boxed * sizes.boxed as f64
+            + self.sampled * sizes.sampled as f64
+            + self.walled * walled
             + self.node * nodes
             + self.searched * math::pow(nodes, SEARCH_POWER)
             + self.pixel * pixels
@@ -126,8 +137,8 @@ fn constants(stage: Stage) -> [PerSize; 2] {
             PerSize { voxel: 0.3, boxed: 1.0, foreground: 12.0, ..none },
         ],
         Stage::Radius => [
-            PerSize { fixed: 0.01, voxel: 9e-10, foreground: 3e-7, ..none },
-            PerSize { voxel: 0.3, boxed: 1.0, foreground: 12.0, ..none },
+            PerSize { fixed: 0.01, voxel: 9e-10, foreground: 3e-7, sampled: 3e-8, walled: 3e-6, ..none },
+            PerSize { voxel: 0.3, boxed: 1.0, sampled: 4.0, foreground: 12.0, ..none },
         ],
         Stage::Tree => [
             PerSize { fixed: 0.01, voxel: 5e-10, foreground: 1.5e-7, node: 6e-6, ..none },
@@ -168,6 +179,7 @@ impl Sizes {
         let sizes = Self {
             voxels: count(Stage::Volume, "voxels"),
             foreground: count(Stage::Skeleton, "foreground_voxels"),
+            sampled: count(Stage::Radius, "scan_voxels"),
             skeleton: count(Stage::Skeleton, "skeleton_voxels"),
             nodes: count(Stage::Tree, "nodes"),
             ..Self::default()
@@ -220,6 +232,7 @@ mod tests {
             held_bytes: 0,
             foreground: 100,
             boxed: 200,
+            sampled: 0,
             skeleton: 10,
             nodes: 5,
             pixels: 50,
@@ -228,6 +241,7 @@ mod tests {
         let larger = [
             Sizes { voxels: 2000, ..small },
             Sizes { foreground: 200, ..small },
+            Sizes { sampled: 200, ..small },
             Sizes { nodes: 50, ..small },
             Sizes { pixels: 500, ..small },
             Sizes { figure_pixels: 500, ..small },

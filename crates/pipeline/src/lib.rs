@@ -63,6 +63,7 @@ mod provenance;
 mod record;
 pub mod run;
 mod scan_of_map;
+mod scan_of_walls;
 mod settings;
 mod shell;
 mod side_file;

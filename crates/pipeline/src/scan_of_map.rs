@@ -79,7 +79,8 @@ pub(crate) fn check(config: &Config, source: &Source) -> Result<(), NoScan> {
 /// The part of the scan that the map of a tree shows, with what its reader had to say.
 pub(crate) fn of_tree(step: &mut Step<'_>, tree: &Tree, params: &Params) -> Result<(Volume, Report), Error> {
     let corners_mm = box_of(tree, |radius_mm| params.volume.farthest_mm(radius_mm));
-    let (cropped, path) = step.take(|artifacts, lookup| artifacts.scan_of_map(lookup, corners_mm))?;
+    let (cropped, path) =
+        step.take(|artifacts, lookup| artifacts.scan_in_box(lookup, (SideFile::Image, corners_mm)))?;
     let refused = |problem: NoScan| Error::file(&path, problem);
     let what = match cropped.kind {
         Kind::Mask { .. } => Some("a mask"),

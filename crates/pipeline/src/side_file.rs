@@ -16,14 +16,23 @@ pub enum SideFile {
     Edits,
     /// `embed.marino.view_file`: the view of the baseline.
     MarinoView,
+    /// `radius.image`: the scan in which walls are looked for.
+    WallImage,
     /// `render.volume.image`: the scan on the map.
     Image,
 }
 
 impl SideFile {
     /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::InputLabels, Self::Labels, Self::LabelNames, Self::Edits, Self::MarinoView, Self::Image];
+    pub const ALL: [Self; 7] = [
+        Self::InputLabels,
+        Self::Labels,
+        Self::LabelNames,
+        Self::Edits,
+        Self::MarinoView,
+        Self::WallImage,
+        Self::Image,
+    ];
 
     /// The name in provenance.
     pub(crate) fn role(self) -> &'static str {
@@ -33,6 +42,7 @@ impl SideFile {
             Self::LabelNames => "label_names",
             Self::Edits => "edits",
             Self::MarinoView => "marino_view",
+            Self::WallImage => "wall_image",
             Self::Image => "image",
         }
     }
@@ -46,8 +56,14 @@ impl SideFile {
             Self::LabelNames => "tree.label_names",
             Self::Edits => "embed.edits",
             Self::MarinoView => "embed.marino.view_file",
+            Self::WallImage => "radius.image",
             Self::Image => "render.volume.image",
         }
+    }
+
+    /// Whether it is a volume, which can be a folder of slices.
+    pub(crate) fn is_volume(self) -> bool {
+        matches!(self, Self::Labels | Self::WallImage | Self::Image)
     }
 
     /// The stage that reads it.
@@ -56,6 +72,7 @@ impl SideFile {
             Self::InputLabels => Stage::Volume,
             Self::Labels | Self::LabelNames => Stage::Tree,
             Self::Edits | Self::MarinoView => Stage::Embed,
+            Self::WallImage => Stage::Radius,
             Self::Image => Stage::Render,
         }
     }
@@ -69,6 +86,7 @@ impl SideFile {
             Self::LabelNames => &mut config.tree.label_names,
             Self::Edits => &mut config.embed.edits,
             Self::MarinoView => &mut config.embed.marino.view_file,
+            Self::WallImage => &mut config.radius.image,
             Self::Image => &mut config.render.volume.image,
         }
     }
@@ -81,6 +99,7 @@ impl SideFile {
             Self::LabelNames => &config.tree.label_names,
             Self::Edits => &config.embed.edits,
             Self::MarinoView => &config.embed.marino.view_file,
+            Self::WallImage => &config.radius.image,
             Self::Image => &config.render.volume.image,
         };
         path.as_deref().filter(|path| !path.is_empty())

@@ -116,10 +116,9 @@ impl Stage {
     pub(crate) fn version(self) -> u32 {
         match self {
             Self::Phantom | Self::Views => 1,
-            Self::Radius => 2,
-            Self::Skeleton | Self::Tree => 3,
-            Self::Embed | Self::Render | Self::Report => 4,
-            Self::Volume => 5,
+            Self::Radius | Self::Skeleton => 3,
+            Self::Tree | Self::Embed | Self::Render => 4,
+            Self::Volume | Self::Report => 5,
         }
     }
 
@@ -128,6 +127,8 @@ impl Stage {
     pub(crate) fn reads_beside(self) -> Vec<String> {
         match self {
             Self::Tree => [DROPPED_FILE, Artifact::Traced.file()].map(str::to_owned).into(),
+            // The scan only where walls are looked for in it.
+            Self::Radius => vec![Artifact::Volume.file().to_owned()],
             // The scan only for a map that shows it; of the mask and of the labels of branches the organ beside the map.
             Self::Render => {
                 let read = [Artifact::Comparison, Artifact::Volume, Artifact::Mask].map(Artifact::file);

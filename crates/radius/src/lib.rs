@@ -8,6 +8,7 @@
 //! | 4 | `section` | area and centroid of the mask's cross-section |
 //! | 5 | `boundary` | where the section is not round: the ridge of the distance between voxels |
 //! | 6 | `gap` | the wall lies between the last voxels inside and the first outside |
+//! | 7 | `wall/*` | where the scan shows the wall, which is not where a threshold has ended the mask |
 //! | – | `distance` | the distance of every foreground voxel, for those who ask for the whole field |
 //!
 //! **Spaces** inside this crate points are *grid mm*: voxel coordinates times spacing. Spheres come out in RAS+ mm.
@@ -21,24 +22,28 @@ mod params;
 mod ridge;
 mod section;
 mod tangent;
+mod wall;
 
-use espalier_model::{InscribedSpheres, Mask, Report, Skeleton, Sphere};
+use espalier_model::{InscribedSpheres, Mask, Report, Skeleton, Sphere, Volume};
 use glam::DVec3;
 use rayon::prelude::*;
 
 pub use distance::{DistanceField, distance_field, distance_field_within};
 pub use error::Error;
-pub use params::{Params, Rule};
+pub use params::{Params, Rule, Wall};
 
 use nearest::Background;
 use ridge::OnAxis;
+
+/// A wall lies inside the mask's surface by at most this share of the radius: that a voxel was chosen is evidence too.
+const MOST_NARROWING: f64 = 0.5;
 
 /// The inscribed spheres of a skeleton and what their making did.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
     /// One sphere for each skeleton voxel, in the same order.
     pub spheres: InscribedSpheres,
-    /// Counts `spheres`, `cut_spheres`, `sections_without_direction`, `radius_min_mm`, `radius_max_mm`,
+    /// Counts `spheres`, `cut_spheres`, `sections_without_direction`; of the mask `radius_min_mm`, `radius_max_mm`,
     /// `center_shift_mean_mm`; a warning where the border of the scan cuts spheres.
     pub report: Report,
 }
@@ -50,13 +55,65 @@ pub struct Measured {
 /// at the first skeleton voxel that is background.
 pub fn inscribed_spheres(mask: &Mask, skeleton: &Skeleton, params: &Params) -> Result<Measured, Error> {
     let distances_mm = distances_mm(mask, skeleton)?;
-    let tangents = tangent::tangents(skeleton, &distances_mm);
+    let tangents = tangent::along(skeleton, &tangent::neighbors(skeleton), &distances_mm);
     let spheres: Vec<Sphere> = (0..skeleton.voxels().len())
         .into_par_iter()
         .map(|i| measure(mask, skeleton.voxels()[i], (distances_mm[i], tangents[i]), params))
         .collect();
     let report = report(skeleton, &spheres);
     Ok(Measured { spheres: InscribedSpheres(spheres), report })
+}
+
+/// The spheres of a mask, as [`inscribed_spheres`] has measured them, with the wall where `scan` shows it.
+///
+/// The report counts `walls` (places that show one), `wall_beyond_mean_mm`, and what the scan's thick branches say:
+/// `lumen_value`, `wall_value` (of dark lumina; of bright ones what is around them), `blur_mm`. A warning where half of the
+/// places or more show no wall.
+///
+/// # Errors
+/// As [`inscribed_spheres`].
+pub fn walls(
+    (mask, skeleton): (&Mask, &Skeleton),
+    spheres: &InscribedSpheres,
+    scan: &Volume,
+) -> Result<Measured, Error> {
+    let distances_mm = distances_mm(mask, skeleton)?;
+    let neighbors = tangent::neighbors(skeleton);
+    let tangents = tangent::along(skeleton, &neighbors, &distances_mm);
+    let background = Background::of(mask);
+    let grid_mm =
+        |point_mm: DVec3| mask.grid().voxel_from_world().transform_point3(point_mm) * background.spacing_mm();
+    let place = |(sphere, tangent): (&Sphere, &Option<DVec3>)| {
+        let tangent = (*tangent)?;
+        Some(wall::Place { center: grid_mm(sphere.center_mm), tangent, radius_mm: sphere.radius_mm })
+    };
+    let places: Vec<Option<wall::Place>> = spheres.0.iter().zip(&tangents).map(place).collect();
+    let found = wall::Scan::new((background, mask.grid()), scan).walls(&places, &neighbors);
+    let with_wall = |(sphere, wall_mm): (&Sphere, &f64)| Sphere {
+        wall_mm: wall_mm.max(-MOST_NARROWING * sphere.radius_mm),
+        ..*sphere
+    };
+    let spheres: Vec<Sphere> = spheres.0.iter().zip(&found.beyond_mm).map(with_wall).collect();
+    let report = report_of_walls(&found);
+    Ok(Measured { spheres: InscribedSpheres(spheres), report })
+}
+
+fn report_of_walls(found: &wall::Walls) -> Report {
+    let (mut report, n) = (Report::default(), found.beyond_mm.len());
+    report.count_usize("walls", found.n_seen);
+    report.count("wall_beyond_mean_mm", found.beyond_mm.iter().sum::<f64>() / n as f64);
+    report.count("lumen_value", found.lumen);
+    report.count("wall_value", found.wall);
+    report.count("blur_mm", found.blur_mm);
+    if 2 * found.n_seen <= n {
+        let message = format!(
+            "the scan shows the wall at {} of {n} places of the skeleton; the radii of the others follow from their \
+             neighbours', or from the mask: radius.wall = \"mask\" keeps to the mask",
+            found.n_seen
+        );
+        report.warn("W-RADIUS-WALL", message);
+    }
+    report
 }
 
 /// The exact distance from each voxel of `skeleton` to the nearest background centre of `mask`, in mm; infinite in a
@@ -116,6 +173,7 @@ fn measure(
         radius_mm,
         distance_mm: known(distance_mm),
         area_radius_mm: section.map_or(f64::NAN, |section| section.area_radius_mm),
+        wall_mm: 0.0,
         is_cut: border_mm < radius_mm,
     }
 }

@@ -22,10 +22,19 @@ const MIN_SHARE: f64 = 0.65;
 /// Squarings of the covariance: 2⁶ power iterations, so that a share of 0.65 leaves nothing of the rest.
 const N_SQUARINGS: usize = 6;
 
-/// The direction at each skeleton voxel.
-pub(crate) fn tangents(skeleton: &Skeleton, distances_mm: &[f64]) -> Vec<Option<DVec3>> {
+/// The 26-neighbours of each skeleton voxel, by their indices.
+pub(crate) fn neighbors(skeleton: &Skeleton) -> Vec<Vec<usize>> {
     let voxels = skeleton.voxels();
-    let neighbors: Vec<Vec<usize>> = voxels.par_iter().map(|&voxel| neighbors_of(voxels, voxel)).collect();
+    voxels.par_iter().map(|&voxel| neighbors_of(voxels, voxel)).collect()
+}
+
+/// The direction at each skeleton voxel.
+pub(crate) fn along(
+    skeleton: &Skeleton,
+    neighbors: &[Vec<usize>],
+    distances_mm: &[f64],
+) -> Vec<Option<DVec3>> {
+    let voxels = skeleton.voxels();
     let spacing = skeleton.grid().spacing_mm();
     let positions: Vec<DVec3> =
         voxels.iter().map(|voxel| DVec3::from_array(voxel.map(f64::from)) * spacing).collect();
@@ -35,7 +44,7 @@ pub(crate) fn tangents(skeleton: &Skeleton, distances_mm: &[f64]) -> Vec<Option<
             let distance = distances_mm[start].min(1e9);
             let unit = spacing.max_element();
             let window = (WINDOW_PER_DISTANCE * distance).clamp(MIN_WINDOW * unit, MAX_WINDOW * unit);
-            let points = connected_within(start, window, &neighbors, &positions);
+            let points = connected_within(start, window, neighbors, &positions);
             principal_axis(&points)
         })
         .collect()

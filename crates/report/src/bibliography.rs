@@ -49,7 +49,7 @@ impl Publication {
 
 const TVCG: (&str, &str) = ("journal", "IEEE Transactions on Visualization and Computer Graphics");
 
-const ALL: [Publication; 16] = [
+const ALL: [Publication; 17] = [
     Publication {
         key: "Hu2022",
         kind: "article",
@@ -109,6 +109,16 @@ const ALL: [Publication; 16] = [
         venue: ("journal", "IEEE Transactions on Systems, Man, and Cybernetics"),
         place: &[("volume", "8"), ("number", "8"), ("pages", "630--632")],
         year: "1978",
+    },
+    Publication {
+        key: "Reinhardt1997",
+        kind: "article",
+        short: "Reinhardt et al. 1997",
+        authors: "Reinhardt, J. M. and D'Souza, N. D. and Hoffman, E. A.",
+        title: "Accurate measurement of intrathoracic airways",
+        venue: ("journal", "IEEE Transactions on Medical Imaging"),
+        place: &[("volume", "16"), ("number", "6"), ("pages", "820--827")],
+        year: "1997",
     },
     Publication {
         key: "Adams1994",

@@ -118,6 +118,7 @@ fn centreline(facts: &Facts<'_>) -> Vec<String> {
     }
     if ran("radius") {
         sentences.push("At each skeleton voxel the radius was measured against the background of the mask, with centres below the size of a voxel.".into());
+        sentences.extend(walls(facts));
     }
     let n_of = |kind| facts.ledger.map_or(0, |ledger| ledger.n_of(kind));
     if facts.is_of_scan() && facts.ledger.is_some() {
@@ -139,6 +140,19 @@ fn centreline(facts: &Facts<'_>) -> Vec<String> {
         unit.text(tree.length_mm(), 4)
     ));
     sentences
+}
+
+/// How radii came from the mask to the wall.
+fn walls(facts: &Facts<'_>) -> Option<String> {
+    let count = |name| facts.count("radius", name);
+    let (n_walls, n_spheres) = (count("walls")?, count("spheres")?);
+    Some(format!(
+        "Radii reach to the wall in the scan: a blurred tube was fitted to the values along rays across the branch \
+         [Reinhardt1997], at {} of {} voxels; on average it lies {} mm beyond the mask.",
+        number(n_walls, 12),
+        number(n_spheres, 12),
+        number(count("wall_beyond_mean_mm")?, 3)
+    ))
 }
 
 fn embedding(facts: &Facts<'_>) -> Vec<String> {

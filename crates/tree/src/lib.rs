@@ -62,6 +62,7 @@ mod smooth;
 mod summary;
 mod tips;
 mod traced;
+mod wall;
 
 use espalier_model::swc::Traced;
 use espalier_model::{InscribedSpheres, Ledger, LedgerEntry, LedgerKind, Mask, Node, Report, Skeleton, Tree};
@@ -130,7 +131,8 @@ pub fn build(
     }
 
     let resolution_mm = RESOLUTION * mask.grid().spacing_mm().min_element();
-    let nodes = merge::merge_near(&outline_nodes(&outline, resolution_mm, &mut ledger), &mut ledger);
+    let mut nodes = merge::merge_near(&outline_nodes(&outline, resolution_mm, &mut ledger), &mut ledger);
+    wall::widen(&mut nodes, spheres);
     let kind = if params.resample == Resample::Auto { Resample::Shape } else { params.resample };
     finish(&nodes, kind, params, ledger, report)
 }

@@ -126,15 +126,23 @@ pub fn measure(case: &Case) -> Result<Measured, Box<dyn Error>> {
     let roughness = if case.scan == Scan::Rough { ROUGHNESS } else { 0.0 };
     let params = Params { spacing_mm: case.spacing_mm, size, roughness, ..Params::default() };
     let phantom = espalier_phantom::generate(case.kind, &params, case.seed)?;
-    let (mask, dropped) = mask_of(case, &phantom, &params)?;
-    let (skeleton, built) =
-        skeleton_and_tree(&mask, if case.kind == Kind::Airway { Root::Superior } else { Root::ThickestTip })?;
+    let Masked { mask, dropped, ct } = mask_of(case, &phantom, &params)?;
+    let (skeleton, built) = skeleton_and_tree(
+        (&mask, ct.as_ref()),
+        if case.kind == Kind::Airway { Root::Superior } else { Root::ThickestTip },
+    )?;
     let score = score(&phantom.tree, &built.tree, spacing);
     Ok(Measured { case: *case, mask, dropped, skeleton, truth: phantom.tree, built, score })
 }
 
-/// The mask of a case as the volume stage hands it on, and its part of the ledger.
-fn mask_of(case: &Case, phantom: &Phantom, params: &Params) -> Result<(Mask, Ledger), Box<dyn Error>> {
+/// A mask as the volume stage hands it on, its part of the ledger, and the scan, if its intensities have made the mask.
+struct Masked {
+    mask: Mask,
+    dropped: Ledger,
+    ct: Option<Volume>,
+}
+
+fn mask_of(case: &Case, phantom: &Phantom, params: &Params) -> Result<Masked, Box<dyn Error>> {
     if let (true, Some(how)) = (case.scan.is_ct(), phantom.truth.segmentation) {
         let ct = espalier_phantom::ct(phantom, params, case.seed)?;
         let (is_band, is_airway) = (case.scan == Scan::Ct, case.kind == Kind::Airway);
@@ -147,10 +155,11 @@ fn mask_of(case: &Case, phantom: &Phantom, params: &Params) -> Result<(Mask, Led
             ..espalier_volume::Params::default()
         };
         let segmented = espalier_volume::segment(&ct, &volume)?;
-        return Ok((segmented.mask, segmented.ledger));
+        return Ok(Masked { mask: segmented.mask, dropped: segmented.ledger, ct: Some(ct) });
     }
     let mask = phantom.mask.as_ref().ok_or("a phantom without a mask")?;
-    cleaned(mask)
+    let (mask, dropped) = cleaned(mask)?;
+    Ok(Masked { mask, dropped, ct: None })
 }
 
 /// Components and cavities of a mask as the volume stage leaves them.
@@ -171,13 +180,19 @@ fn cleaned(mask: &Mask) -> Result<(Mask, Ledger), Box<dyn Error>> {
 /// # Errors
 /// Those of the stages.
 pub fn tree_of(mask: &Mask, root: Root) -> Result<Built, Box<dyn Error>> {
-    Ok(skeleton_and_tree(mask, root)?.1)
+    Ok(skeleton_and_tree((mask, None), root)?.1)
 }
 
-fn skeleton_and_tree(mask: &Mask, root: Root) -> Result<(Skeleton, Built), Box<dyn Error>> {
+fn skeleton_and_tree(
+    (mask, scan): (&Mask, Option<&Volume>),
+    root: Root,
+) -> Result<(Skeleton, Built), Box<dyn Error>> {
     let skeleton = espalier_skeleton::skeletonize(mask, &espalier_skeleton::Params::default())?.skeleton;
-    let spheres =
+    let mut spheres =
         espalier_radius::inscribed_spheres(mask, &skeleton, &espalier_radius::Params::default())?.spheres;
+    if let Some(scan) = scan {
+        spheres = espalier_radius::walls((mask, &skeleton), &spheres, scan)?.spheres;
+    }
     let params = espalier_tree::Params { root, ..espalier_tree::Params::default() };
     let built = espalier_tree::build(mask, &skeleton, &spheres, &params)?;
     Ok((skeleton, built))

@@ -66,6 +66,7 @@ pub(super) fn spheres() -> Vec<Seed> {
         radius_mm: stream.uniform(0.1, 9.0),
         distance_mm: stream.uniform(0.1, 9.0),
         area_radius_mm: if stream.below(3) == 0 { f64::NAN } else { stream.unit() },
+        wall_mm: 0.0,
         is_cut: stream.below(5) == 0,
     };
     let spheres = InscribedSpheres((0..N_SPHERES).map(|_| sphere()).collect());

@@ -52,7 +52,7 @@ fn of_folder(
     let mut request =
         Request { from: Some(which), to: Some(which), force, wait, ..request(arguments, loaded, out) };
     if request.out != folder {
-        let known = which.reads().iter().chain(&[Artifact::Traced, Artifact::Comparison]);
+        let known = which.reads().iter().chain(&[Artifact::Volume, Artifact::Traced, Artifact::Comparison]);
         let files = known.map(|artifact| (*artifact, folder.join(artifact.file())));
         request.files = files.filter(|(_, file)| file.exists()).collect();
         if request.files.contains_key(&Artifact::Mask) {

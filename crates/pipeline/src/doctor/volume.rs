@@ -29,6 +29,8 @@ const LARGEST_SHARE: f64 = 0.5;
 const LARGEST_ANISOTROPY: f64 = 3.0;
 /// How many values of a label map are listed.
 const MOST_LISTED: usize = 24;
+/// The box around an organ, as a share of its scan.
+const ORGAN_BOX: f64 = 0.4;
 /// A scan is held whole while a region grows in it, with a bit and a level a voxel.
 const HELD_BYTES: u64 = 2;
 
@@ -224,7 +226,9 @@ fn settle_scan(run: &Request, survey: &Survey, found: &mut Findings) {
     let foreground = (ml * 1e3 / survey.grid.voxel_volume_mm3()) as u64;
     found.assumed = Some(format!("{ml:.0} ml of {what}"));
     let voxels = survey.grid.n_voxels() as u64;
-    found.sizes = Some(Sizes { voxels, held_bytes: HELD_BYTES, foreground, ..Sizes::default() });
+    let keeps_to_mask = run.loaded.config.radius.wall == espalier_radius::Wall::Mask;
+    let sampled = if keeps_to_mask { 0 } else { (ORGAN_BOX * voxels as f64) as u64 };
+    found.sizes = Some(Sizes { voxels, held_bytes: HELD_BYTES, foreground, sampled, ..Sizes::default() });
 }
 
 /// The sizes after the first two stages of a run.

@@ -8,9 +8,9 @@ use crate::error::Error;
 use crate::folder::{RunFolder, hex_digest};
 use crate::provenance;
 use crate::record::MadeFrom;
-use crate::scan_of_map;
 use crate::settings::Settings;
 use crate::stage::{Artifact, Stage};
+use crate::{scan_of_map, scan_of_walls};
 
 impl Run<'_> {
     /// All that a stage's results depend on, as it is now.
@@ -42,9 +42,14 @@ impl Run<'_> {
             let digest = provenance::digest_of_all(&self.artifacts.files_beside(*side, stage)?, path)?;
             facts.insert(side.key().to_owned(), digest);
         }
-        // A map that shows the run's own input depends on it.
-        let shows_input = stage == Stage::Render && scan_of_map::is_of_input(&self.request.loaded.config);
-        if let (true, Some(path)) = (shows_input, self.artifacts.files.get(&Artifact::Volume)) {
+        // A map that shows the run's own input depends on it, and so do radii that look for walls in it.
+        let config = &self.request.loaded.config;
+        let looks_at_input = match stage {
+            Stage::Radius => scan_of_walls::is_of_input(config, &self.source),
+            Stage::Render => scan_of_map::is_of_input(config),
+            _ => false,
+        };
+        if let (true, Some(path)) = (looks_at_input, self.artifacts.files.get(&Artifact::Volume)) {
             let rows = provenance::input_rows(&input_files(&self.source, &self.artifacts, (stage, path))?)?;
             facts.insert(Artifact::Volume.what().to_owned(), hex_digest(rows.as_bytes()));
         }

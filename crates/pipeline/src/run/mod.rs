@@ -31,11 +31,10 @@ use crate::failure;
 use crate::folder::{DIGEST_FILE, RunFolder};
 use crate::lock::Patience;
 use crate::provenance::{self, StageCost};
-use crate::scan_of_map;
 use crate::settings::{self, Settings};
-use crate::side_file::SideFile;
 use crate::stage::{Artifact, Stage};
 use crate::steps;
+use crate::{scan_of_map, scan_of_walls};
 
 pub use plan::{Plan, plan};
 pub use source::default_folder;
@@ -159,6 +158,10 @@ fn prepare<'a>(
         let refused = |problem| Error::stage(Stage::Render)(boxed(problem));
         scan_of_map::check(&request.loaded.config, &source).map_err(refused)?;
     }
+    if stages.contains(&Stage::Radius) {
+        let refused = |problem| Error::stage(Stage::Radius)(boxed(problem));
+        scan_of_walls::check(&request.loaded.config, &source).map_err(refused)?;
+    }
     let artifacts = artifacts_of(request, &source);
     let input = input_file(&stages, &artifacts);
     let sides = artifacts.side_paths.iter().filter(|(side, _)| stages.contains(&side.stage()));
@@ -166,7 +169,7 @@ fn prepare<'a>(
         steps::check_readable(input, matches!(source, Source::Volume(_)))?;
     }
     for (side, path) in sides {
-        steps::check_readable(path, *side == SideFile::Image)?;
+        steps::check_readable(path, side.is_volume())?;
     }
     let run = Run {
         request,

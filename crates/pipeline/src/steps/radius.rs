@@ -1,4 +1,4 @@
-//! Mask and skeleton → inscribed spheres.
+//! Mask and skeleton, and the scan if there is one → inscribed spheres.
 
 use std::sync::Arc;
 
@@ -8,18 +8,33 @@ use super::{Outcome, Step};
 use crate::artifacts::Artifacts;
 use crate::error::Error;
 use crate::estimate::Sizes;
+use crate::scan_of_walls;
 use crate::stage::Artifact;
 
 pub(super) fn radius(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let mask = step.take(Artifacts::mask)?;
     let skeleton = step.take(Artifacts::skeleton)?;
-    step.must_fit(&Sizes::of_mask(&mask))?;
+    let sampled = scan_of_walls::n_voxels(step.config, step.source, &mask);
+    step.must_fit(&Sizes { sampled, ..Sizes::of_mask(&mask) })?;
     let measured = espalier_radius::inscribed_spheres(&mask, &skeleton, &step.config.radius)
         .map_err(|error| step.failed(error))?;
-    let spheres = measured.spheres;
-    let radii = || spheres.0.iter().map(|sphere| sphere.radius_mm);
-    let line =
-        format!("{:.2} to {:.2} mm", radii().fold(f64::INFINITY, f64::min), radii().fold(0.0, f64::max));
+    let (mut spheres, mut report) = (measured.spheres, measured.report);
+    let scan = scan_of_walls::around(step, &mask)?;
+    if let Some((scan, notes)) = &scan {
+        let walls =
+            espalier_radius::walls((&mask, &skeleton), &spheres, scan).map_err(|error| step.failed(error))?;
+        spheres = walls.spheres;
+        report.warnings.extend(notes.warnings.clone());
+        report.extend(walls.report);
+        report.count_usize("scan_voxels", scan.grid().n_voxels());
+    }
+    let radii = || spheres.0.iter().map(|sphere| sphere.radius_mm + sphere.wall_mm);
+    let line = format!(
+        "{:.2} to {:.2} mm{}",
+        radii().fold(f64::INFINITY, f64::min),
+        radii().fold(0.0, f64::max),
+        if scan.is_some() { ", to the wall in the scan" } else { "" }
+    );
     let single: Vec<f32> = radii().map(|radius_mm| radius_mm as f32).collect();
     let radius_image = nifti_out::skeleton_scalars(&skeleton, &single).map_err(|error| step.failed(error))?;
     let table = spheres.to_tsv();
@@ -29,7 +44,7 @@ pub(super) fn radius(step: &mut Step<'_>) -> Result<Outcome, Error> {
     if step.config.radius.field {
         files.push(step.beside("distance.nii.gz", distance_image(step, &mask)?));
     }
-    Ok(Outcome { files, report: measured.report, line })
+    Ok(Outcome { files, report, line })
 }
 
 /// The distance of every voxel of the mask to the background, in mm.

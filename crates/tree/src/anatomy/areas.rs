@@ -23,7 +23,7 @@ pub(super) fn radii_mm(tree: &Tree, spheres: Option<&InscribedSpheres>) -> Vec<f
         let nearest = near.min_by(|a, b| distance(a).total_cmp(&distance(b)));
         nearest
             .filter(|sphere| distance(sphere) <= radius_mm)
-            .map_or(f64::NAN, |sphere| sphere.area_radius_mm)
+            .map_or(f64::NAN, |sphere| (sphere.area_radius_mm + sphere.wall_mm).max(0.0))
     };
     tree.nodes().iter().map(|node| area_at((node.position_mm, node.radius_mm))).collect()
 }

@@ -187,6 +187,7 @@ fn areas_come_from_the_nearest_cross_section() {
         radius_mm: 1.0,
         distance_mm: 1.0,
         area_radius_mm,
+        wall_mm: 0.0,
         is_cut: false,
     };
     let spheres = InscribedSpheres(vec![sphere(-0.4, 1.5), sphere(-0.1, f64::NAN), sphere(-5.0, 9.0)]);

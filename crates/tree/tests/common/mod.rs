@@ -35,7 +35,14 @@ pub(crate) fn inputs(places: &Places, shape: [usize; 3]) -> (Mask, Skeleton, Ins
         .map(|voxel| {
             let radius_mm = places.iter().filter(|p| p.0 == *voxel).map(|p| p.1).fold(0.0, f64::max);
             let center_mm = DVec3::new(f64::from(voxel[0]), f64::from(voxel[1]), f64::from(voxel[2]));
-            Sphere { center_mm, radius_mm, distance_mm: radius_mm, area_radius_mm: radius_mm, is_cut: false }
+            Sphere {
+                center_mm,
+                radius_mm,
+                distance_mm: radius_mm,
+                area_radius_mm: radius_mm,
+                wall_mm: 0.0,
+                is_cut: false,
+            }
         })
         .collect();
     (mask, skeleton, InscribedSpheres(spheres))
