@@ -240,7 +240,7 @@ fn an_oblique_organ() {
     check(&Scan::organ([0.5, 1.0, 0.625], [-16.2, 88.4, 4.9], 30.0));
 }
 
-/// The masks of a CT in some orders, grown from the seed that each finds.
+/// The masks of a CT in some orders, grown from the seed that each finds, and the radii up to its walls.
 fn check_ct(ct: &Scan) {
     let folder = tempfile::tempdir().expect("a folder for temporary files");
     let path = folder.path().join("volume");
@@ -258,6 +258,20 @@ fn check_ct(ct: &Scan) {
     assert!(expected.n_foreground() > 1000, "{} voxels", expected.n_foreground());
     for order in Order::all().into_iter().step_by(7) {
         assert!(bytes(&grown(&order.of(ct))) == bytes(&expected), "{order:?}");
+    }
+    let out = folder.path().join("out");
+    let measured = |scan: &Scan| -> [Vec<u8>; 2] {
+        std::fs::write(&path, scan.nifti()).expect("writable");
+        let done = run_range(&path, &out, &[set("volume.preset", "airway")], (None, Some(Stage::Tree)));
+        done.unwrap_or_else(|error| panic!("{error}"));
+        let made = ["stages/03-radius/spheres.tsv", "tree.swc"]
+            .map(|file| std::fs::read(out.join(file)).expect(file));
+        std::fs::remove_dir_all(&out).expect("removable");
+        made
+    };
+    let expected = measured(ct);
+    for order in Order::all().into_iter().skip(3).step_by(11) {
+        assert!(measured(&order.of(ct)) == expected, "{order:?}");
     }
 }
 

@@ -173,7 +173,7 @@ fn where_nothing_stands_out_radii_are_the_masks() {
 
     // So are they where a scan has no numbers, and where it ends.
     let nowhere = Grid::axis_aligned([4, 4, 4], DVec3::ONE, DVec3::splat(900.0)).expect("a grid");
-    for (grid, value) in [(scene.grid.clone(), f32::NAN), (nowhere, 7.0)] {
+    for (grid, value) in [(scene.grid, f32::NAN), (nowhere, 7.0)] {
         let [nx, ny, nz] = grid.shape();
         let scan = Volume::new(grid, Voxels::F32(Array3::from_elem((nz, ny, nx), value)), 1.0, 0.0);
         let found = walls((&mask, &skeleton), &of_mask, &scan).expect("walls").spheres;

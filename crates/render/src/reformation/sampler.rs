@@ -54,26 +54,7 @@ impl<'a> Sampler<'a> {
 
     /// The value at a point.
     pub(super) fn at(&self, point_mm: DVec3) -> Option<f64> {
-        let grid = self.scan.grid();
-        let voxel = self.voxel_from_world.transform_point3(point_mm);
-        grid.voxel_at(voxel)?;
-        let shape = grid.shape();
-        let (mut low, mut share) = ([0_usize; 3], [0.0; 3]);
-        for axis in 0..3 {
-            let place = voxel[axis].clamp(0.0, (shape[axis] - 1) as f64);
-            low[axis] = (place as usize).min(shape[axis].saturating_sub(2));
-            share[axis] = place - low[axis] as f64;
-        }
-        let mut sum = 0.0;
-        for corner in 0..8 {
-            let side = [corner & 1, corner >> 1 & 1, corner >> 2];
-            let weight: f64 =
-                (0..3).map(|axis| if side[axis] == 1 { share[axis] } else { 1.0 - share[axis] }).product();
-            if weight > 0.0 {
-                sum += weight * self.scan.value(grid.index([0, 1, 2].map(|axis| low[axis] + side[axis])));
-            }
-        }
-        sum.is_finite().then_some(sum)
+        self.scan.between(self.voxel_from_world.transform_point3(point_mm))
     }
 }
 
