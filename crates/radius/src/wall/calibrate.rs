@@ -28,6 +28,9 @@ const LEAST_SECTIONS: usize = 20;
 const USUAL_BLUR: f64 = 0.5;
 /// A wall stands out from the lumen by this multiple of the noise.
 const LEAST_CONTRAST: f64 = 3.0;
+/// So does what is seen of it by this share of what a thick wall would show: a bronchus as bright as the lung around it, with no
+/// wall that is seen, ends nowhere.
+const LEAST_RISE: f64 = 0.15;
 /// A tube explains a ray if the root mean square of what it leaves is at most this share of the contrast.
 const MOST_RESIDUAL: f64 = 0.2;
 
@@ -61,11 +64,16 @@ impl Calibration {
     }
 
     /// Where a ray meets the wall, in mm from the axis; none where it shows no tube.
-    pub(super) fn radius_mm(&self, ray: &Ray, step_mm: f64, disc: &Disc) -> Option<f64> {
+    pub(super) fn radius_mm(&self, ray: &Ray, section: &Section, disc: &Disc) -> Option<f64> {
         let variance = self.blur_mm * self.blur_mm + VOXEL_VARIANCE * ray.voxel_mm * ray.voxel_mm;
-        let known = Known { sigma_mm: variance.sqrt(), is_sigma_free: false, ..self.known(ray) };
-        let tube = fit(ray, step_mm, known, disc)?;
-        let is_seen = tube.contrast > self.least_contrast && tube.residual <= MOST_RESIDUAL * tube.contrast;
+        // A scanner's kernel that sharpens makes thin lumina darker than the trachea.
+        let lumen = if self.is_dark { self.lumen.min(section.lumen) } else { self.lumen };
+        let known = Known { lumen, sigma_mm: variance.sqrt(), is_sigma_free: false, ..self.known(ray) };
+        let tube = fit(ray, section.step_mm, known, disc)?;
+        let rise =
+            if self.is_dark { peak(ray, section.step_mm, f64::max) - section.lumen } else { tube.contrast };
+        let is_seen = rise > self.least_contrast.max(LEAST_RISE * tube.contrast)
+            && tube.residual <= MOST_RESIDUAL * tube.contrast;
         is_seen.then_some(tube.radius_mm)
     }
 
@@ -107,12 +115,14 @@ fn rise(section: &Section) -> f64 {
 
 /// What each ray reaches beyond the surface that is farthest from the lumen.
 fn peaks(section: &Section, is_dark: bool) -> Vec<f64> {
-    let farther = |a: f64, b: f64| if is_dark { a.max(b) } else { a.min(b) };
-    let of_ray = |ray: &Ray| {
-        let first = ((ray.surface_mm / section.step_mm) as usize).min(ray.values.len() - 1);
-        ray.values[first..].iter().copied().reduce(farther)
-    };
-    section.rays.iter().flatten().filter_map(of_ray).collect()
+    let farther = if is_dark { f64::max } else { f64::min };
+    section.rays.iter().flatten().map(|ray| peak(ray, section.step_mm, farther)).collect()
+}
+
+/// What a ray reaches beyond the surface.
+fn peak(ray: &Ray, step_mm: f64, farther: fn(f64, f64) -> f64) -> f64 {
+    let first = ((ray.surface_mm / step_mm) as usize).min(ray.values.len() - 1);
+    ray.values[first..].iter().copied().fold(ray.values[first], farther)
 }
 
 /// The length of a voxel across a section, in mm.

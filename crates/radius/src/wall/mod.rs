@@ -136,7 +136,7 @@ fn beyond_mm(section: &Section, calibration: &Calibration, disc: &Disc) -> Optio
     let is_fine = |ray: &&Ray| ray.voxel_mm <= MOST_UNEVEN * least_mm;
     let fine: Vec<&Ray> = section.rays.iter().flatten().filter(is_fine).collect();
     let met = fine.iter().filter_map(|ray| {
-        let wall_mm = calibration.radius_mm(ray, section.step_mm, disc)?;
+        let wall_mm = calibration.radius_mm(ray, section, disc)?;
         let voxels = (wall_mm - ray.surface_mm) / ray.voxel_mm;
         (-NEAR[0]..=NEAR[1]).contains(&voxels).then_some(Met { voxels, wall_mm, surface_mm: ray.surface_mm })
     });

@@ -26,7 +26,7 @@ const OUTWARDS: f64 = 4.0;
 /// A branch is not wider than so many of its radii.
 const LIMIT_RADII: f64 = 2.5;
 /// The share of the radius within which the lumen is read.
-const CORE: f64 = 0.5;
+const CORE: f64 = 0.3;
 
 /// A cross-section of a branch as the scan has it.
 pub(super) struct Section {
