@@ -11,7 +11,7 @@ use glam::DVec3;
 
 #[test]
 fn a_vessel_tree_is_found() {
-    for scan in [Scan::Clean, Scan::Ct] {
+    for scan in [Scan::Clean, Scan::Ct, Scan::Preset] {
         let case = Case { kind: Kind::Vessel, spacing_mm: [1.5; 3], scan, seed: 7 };
         let measured = measure(&case).expect("a tree");
         let score = measured.score;
@@ -37,6 +37,15 @@ fn radii_in_a_scan_reach_to_its_walls() {
         let score = measured.score;
         assert!(score.radius_bias_voxels.abs() <= 0.15 && score.radius_mae_voxels <= 0.2, "{measured}");
     }
+}
+
+/// Bronchi about as wide as a voxel, in noise; no threshold and no seed given.
+#[test]
+fn airways_of_a_coarse_scan_are_found() {
+    let case = Case { kind: Kind::Airway, spacing_mm: [1.5; 3], scan: Scan::Preset, seed: 7 };
+    let measured = measure(&case).expect("a tree");
+    let score = measured.score;
+    assert!(score.recall() >= 0.7 && score.precision() >= 0.85 && score.stray_share <= 0.01, "{measured}");
 }
 
 /// The centreline and its radii, of a program that works on the surface. Where the section is not quite round, our radius

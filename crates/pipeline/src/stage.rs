@@ -118,7 +118,8 @@ impl Stage {
             Self::Phantom | Self::Views => 1,
             Self::Radius | Self::Skeleton => 3,
             Self::Tree | Self::Embed | Self::Render => 4,
-            Self::Volume | Self::Report => 5,
+            Self::Report => 5,
+            Self::Volume => 6,
         }
     }
 

@@ -100,8 +100,17 @@ fn selection(facts: &Facts<'_>) -> Vec<String> {
         ));
     } else if count("stable_threshold").is_some() && is_found {
         sentences.push(
-            "The threshold is the last before the region leaks through the wall [Mori1996].".to_owned(),
+            "The threshold is the last before the region leaks through the wall [Mori1996], or one that keeps clear of \
+             the leak's beginning."
+                .to_owned(),
         );
+    }
+    if let (Some(edges), Some(n_won)) = (count("edges_threshold"), count("edges_voxels")) {
+        sentences.push(format!(
+            "Up to {} it also grew over edges and corners, by {} voxels.",
+            number(edges, 5),
+            number(n_won, 12)
+        ));
     }
     sentences
 }

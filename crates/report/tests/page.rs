@@ -315,6 +315,13 @@ fn the_methods_say_how_the_mask_was_chosen() {
         ),
         (
             written(
+                &[("band_upper", -871.0), ("edges_threshold", -935.0), ("edges_voxels", 40.0)],
+                &[("volume.seed_voxel", "[1, 2, 3]")],
+            ),
+            "Up to -935 it also grew over edges and corners, by 40 voxels.",
+        ),
+        (
+            written(
                 &[
                     ("band_lower", 156.0),
                     ("half_maximum", 156.0),

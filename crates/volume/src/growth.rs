@@ -14,10 +14,13 @@
 //! **Source** the explosion control of [Mori1996], with the knee found on the whole curve rather than step by step.
 //! **Cost** O(voxels reached + levels) time, a bit a voxel and the region's border in memory.
 
+use espalier_model::Volume;
 use espalier_model::table::{Column, Table, fixed};
-use espalier_model::{Bits, Volume, Voxels};
 
 use crate::half_maximum::HalfMaximum;
+use crate::level_flood::{Flood, Scale};
+use crate::margin::Margin;
+use crate::runs::Connectivity;
 
 /// Over how many levels growth is measured. On the real CTs at hand a wall gives way within one.
 const WINDOW: usize = 5;
@@ -33,10 +36,6 @@ pub(crate) const MIN_VOXELS: usize = 1000;
 /// After a leak the flood goes on for so many levels, or until the region is so many times the stable one.
 const AFTERMATH_LEVELS: usize = 25;
 const AFTERMATH_GROWTH: usize = 6;
-/// Where all values are whole, so many of them make a curve of whole steps.
-const WHOLE_WAY: f64 = 25.0;
-/// The most levels, so that thresholds in any unit cost little.
-const MAX_LEVELS: f64 = 4096.0;
 
 /// Towards which values a region grows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,7 +80,9 @@ pub struct Growth {
     pub voxel_ml: f64,
     /// Where a lumen's edge is, if that was looked for and found.
     pub half_maximum: Option<HalfMaximum>,
-    scale: Scale,
+    /// Where it keeps clear of a leak, if that was looked for and found.
+    pub margin: Option<Margin>,
+    pub(crate) scale: Scale,
 }
 
 /// The columns of `growth.tsv`.
@@ -92,24 +93,18 @@ pub const GROWTH_COLUMNS: [Column; 4] = [
     Column::new(
         "state",
         "n/a",
-        "half: half-way from the values inside to those outside, to which vessels grow; stable: the last threshold \
-         before the leak; leak: from it on the region leaks",
+        "taken: what the region was grown to, if not the stable one; edges: the same over edges and corners; stable: \
+         the last threshold before the leak; leak: from it on the region leaks",
     ),
 ];
 
 impl Growth {
-    /// The threshold to grow to: half-way from inside to outside if that was looked for and found, else the stable
-    /// one, or the last if nothing leaks.
+    /// The threshold to grow to: half-way from inside to outside, or clear of a leak, if that was looked for and
+    /// found, else the stable one, or the last if nothing leaks.
     #[must_use]
     pub fn threshold(&self) -> Option<f64> {
-        if let Some(level) = self.half_level() {
-            return Some(level.threshold);
-        }
-        match self.knee {
-            Knee::Leak { stable } => self.levels.get(stable).map(|level| level.threshold),
-            Knee::None => self.levels.last().map(|level| level.threshold),
-            Knee::NeverCalm => None,
-        }
+        let level = self.half_level().or_else(|| self.level_at(self.margin?.faces));
+        level.or_else(|| self.level_at(self.last_before_leak()?)).map(|level| level.threshold)
     }
 
     /// The level before the leak and the first one in it.
@@ -124,7 +119,20 @@ impl Growth {
     /// The level half-way from inside to outside, or the last before a leak that comes earlier.
     #[must_use]
     pub fn half_level(&self) -> Option<Level> {
-        self.levels.get(self.half_maximum?.level?).copied()
+        self.level_at(self.half_maximum?.level?)
+    }
+
+    fn level_at(&self, level: usize) -> Option<Level> {
+        self.levels.get(level).copied()
+    }
+
+    /// The last level before a leak, or of all; none if it is never calm.
+    pub(crate) fn last_before_leak(&self) -> Option<usize> {
+        match self.knee {
+            Knee::Leak { stable } => Some(stable),
+            Knee::None => self.levels.len().checked_sub(1),
+            Knee::NeverCalm => None,
+        }
     }
 
     /// Whether the region is too small for a leak to be told from noise.
@@ -158,11 +166,12 @@ impl Growth {
             Knee::Leak { stable } => stable,
             Knee::None | Knee::NeverCalm => usize::MAX,
         };
+        let taken = self.half_maximum.map_or(self.margin.map(|margin| margin.faces), |half| half.level);
         for (level_idx, level) in self.levels.iter().enumerate() {
-            let half = self.half_maximum.and_then(|half| half.level);
             let state = match level_idx {
-                idx if half == Some(idx) && idx != stable => "half",
                 idx if idx == stable => "stable",
+                idx if taken == Some(idx) => "taken",
+                idx if self.margin.is_some_and(|margin| margin.edges == Some(idx)) => "edges",
                 idx if idx > stable => "leak",
                 _ => "",
             };
@@ -175,17 +184,26 @@ impl Growth {
 
 /// Grows a region from `seed` up to `limit`.
 pub(crate) fn measure(volume: &Volume, seed: [usize; 3], towards: Towards, limit: f64) -> Growth {
-    let scale = Scale::new(volume, seed, towards, limit);
-    let mut flood = Flood::new(volume, scale, seed);
+    measure_over((volume, seed), Scale::new(volume, seed, towards, limit), Connectivity::Faces)
+}
+
+/// The same over faces, or over edges and corners too.
+pub(crate) fn measure_over(
+    (volume, seed): (&Volume, [usize; 3]),
+    scale: Scale,
+    connectivity: Connectivity,
+) -> Growth {
+    let mut flood = Flood::new(volume, scale, seed, connectivity);
     let mut growth = Growth {
         levels: Vec::new(),
         knee: Knee::NeverCalm,
         voxel_ml: volume.grid().voxel_volume_mm3() / 1000.0,
         half_maximum: None,
+        margin: None,
         scale,
     };
     let mut last_calm = None;
-    for level in 0..flood.queues.len() {
+    for level in 0..scale.n_levels {
         flood.drain(level);
         growth.levels.push(Level { threshold: scale.threshold(level as f64), n_voxels: flood.n_reached });
         if let Knee::Leak { stable } = growth.knee {
@@ -213,117 +231,4 @@ fn is_calm(levels: &[Level]) -> bool {
     };
     let now = levels.last().map_or(0, |level| level.n_voxels);
     before >= MIN_VOXELS && now as f64 <= CALM * before as f64
-}
-
-/// The voxels of the region at one level.
-pub(crate) fn region_at(volume: &Volume, seed: [usize; 3], growth: &Growth, level: usize) -> Bits {
-    let scale = growth.scale;
-    let only = Scale { origin: scale.origin + level as f64 * scale.step, n_levels: 1, ..scale };
-    let mut flood = Flood::new(volume, only, seed);
-    flood.drain(0);
-    flood.is_seen
-}
-
-/// Whether every value is a whole number, so that no threshold between two of them makes a difference.
-fn has_whole_values(volume: &Volume) -> bool {
-    let (slope, intercept) = volume.scaling();
-    let is_stored_whole = !matches!(volume.voxels(), Voxels::F32(_) | Voxels::F64(_));
-    is_stored_whole && slope.fract() == 0.0 && intercept.fract() == 0.0
-}
-
-/// Levels of thresholds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Scale {
-    /// +1 where the threshold rises, −1 where it falls.
-    sign: f64,
-    /// The threshold of level 0, times `sign`.
-    origin: f64,
-    step: f64,
-    n_levels: usize,
-}
-
-impl Scale {
-    fn new(volume: &Volume, seed: [usize; 3], towards: Towards, limit: f64) -> Self {
-        let sign = match towards {
-            Towards::Bright => 1.0,
-            Towards::Dark => -1.0,
-        };
-        let start = sign * volume.value(volume.grid().index(seed));
-        // An open end is the end of the values that there are.
-        let mut end = f64::NEG_INFINITY;
-        volume.for_each_value(|value| {
-            let value = sign * value;
-            end = if value.is_finite() && value > end { value } else { end };
-        });
-        let end = end.min(sign * limit).max(start);
-        // Whole HU for a CT; a thousandth of the way for values on another scale.
-        let way = end - start;
-        let is_whole = way >= if has_whole_values(volume) { WHOLE_WAY } else { 100.0 };
-        let step = if is_whole { 1.0_f64.max((way / MAX_LEVELS).ceil()) } else { way / 1000.0 };
-        let step = if step > 0.0 { step } else { 1.0 };
-        let origin = if step >= 1.0 { (start / step).ceil() * step } else { start };
-        let n_levels = (((end - origin) / step).floor().max(0.0) as usize).min(2 * MAX_LEVELS as usize) + 1;
-        Self { sign, origin, step, n_levels }
-    }
-
-    fn threshold(&self, level: f64) -> f64 {
-        // Adding 0 makes −0 a plain 0.
-        self.sign * (self.origin + level * self.step) + 0.0
-    }
-
-    /// The level at which a voxel of this value enters the band.
-    fn level(&self, value: f64) -> Option<usize> {
-        let above = self.above(value);
-        // False for NaN.
-        (above < self.n_levels as f64).then_some(above.max(0.0) as usize)
-    }
-
-    /// The same, negative for values before the seed's, and as large as it takes.
-    fn above(&self, value: f64) -> f64 {
-        ((self.sign * value - self.origin) / self.step).ceil()
-    }
-}
-
-/// A flood that enters higher levels only when it must.
-struct Flood<'a> {
-    volume: &'a Volume,
-    scale: Scale,
-    is_seen: Bits,
-    /// Voxels about to be entered, by the level that they need.
-    queues: Vec<Vec<usize>>,
-    n_reached: usize,
-}
-
-impl<'a> Flood<'a> {
-    fn new(volume: &'a Volume, scale: Scale, seed: [usize; 3]) -> Self {
-        let mut queues = vec![Vec::new(); scale.n_levels];
-        queues[0].push(volume.grid().index(seed));
-        let mut is_seen = Bits::new(volume.grid().shape());
-        is_seen.set(seed);
-        Self { volume, scale, is_seen, queues, n_reached: 0 }
-    }
-
-    /// Enters all voxels that can be reached at this level.
-    fn drain(&mut self, level: usize) {
-        let grid = self.volume.grid();
-        let shape = grid.shape();
-        let mut queue = std::mem::take(&mut self.queues[level]);
-        while let Some(index) = queue.pop() {
-            self.n_reached += 1;
-            let voxel = grid.voxel(index);
-            for axis in 0..3 {
-                for step in [-1, 1] {
-                    let mut other = voxel;
-                    other[axis] = voxel[axis].wrapping_add_signed(step);
-                    if other[axis] >= shape[axis] || self.is_seen.get(other) {
-                        continue;
-                    }
-                    let other_index = grid.index(other);
-                    let Some(needed) = self.scale.level(self.volume.value(other_index)) else { continue };
-                    self.is_seen.set(other);
-                    if needed <= level { &mut queue } else { &mut self.queues[needed] }.push(other_index);
-                }
-            }
-        }
-    }
 }

@@ -15,23 +15,20 @@
 //! **Differs from the source** the two are a region and what is about it, not all of a picture; and medians.
 //! **Cost** O(region + words of a mask) for each of a few thresholds; memory of six masks.
 
-use espalier_model::{Bits, Volume};
-use rayon::prelude::*;
+use espalier_model::Volume;
 
-use crate::growth::{Growth, Knee, MIN_VOXELS, region_at};
+use crate::growth::{Growth, MIN_VOXELS};
+use crate::level_flood::region_at;
+use crate::runs::Connectivity;
+use crate::surroundings::{Counts, core_and_shell};
 
 /// Of the shell's voxels at most this share may lie in the band. From a share of 0.31 on, voxels at random places hang
 /// together over faces [Grassberger1992]: then region and shell are one tissue.
 const MAX_SHARE: f64 = 0.2;
-/// Steps from the body that the blur of its edge reaches, and steps that the shell is deep.
-const SKIP: usize = 2;
-const DEPTH: usize = 3;
 /// From one level that is tried as a start to the next.
 const STRIDE: usize = 5;
 /// The most rounds; the phantoms need 3 or 4.
 const MAX_ROUNDS: usize = 16;
-/// Values are counted by level, so many to either side of the seed's.
-const REACH: i64 = 1 << 16;
 
 /// A threshold half-way between two values.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,11 +47,7 @@ pub struct HalfMaximum {
 /// The half maximum of the region about `seed`, if the region stands out from what surrounds it at any level before
 /// the leak.
 pub(crate) fn find(volume: &Volume, seed: [usize; 3], growth: &Growth) -> Option<HalfMaximum> {
-    let last = match growth.knee {
-        Knee::Leak { stable } => stable,
-        Knee::None => growth.levels.len().saturating_sub(1),
-        Knee::NeverCalm => return None,
-    };
+    let last = growth.last_before_leak()?;
     let sides_at = |level: usize| Sides::of(volume, seed, growth, level);
     let first = growth.levels.partition_point(|level| level.n_voxels < MIN_VOXELS);
     let mut starts = (first..=last).step_by(STRIDE).map(|level| (level, sides_at(level)));
@@ -88,11 +81,12 @@ struct Sides {
 
 impl Sides {
     fn of(volume: &Volume, seed: [usize; 3], growth: &Growth, level: usize) -> Self {
-        let region = region_at(volume, seed, growth, level);
+        let region = region_at((volume, seed), growth.scale, level, Connectivity::Faces);
         let (core, shell) = core_and_shell(region);
         let inside = Counts::of(volume, growth, &core);
         let outside = Counts::of(volume, growth, &shell);
-        Self { inside: inside.median(), outside: outside.median(), share: outside.share_up_to(level) }
+        let share = outside.up_to(level as i64) as f64 / outside.n().max(1) as f64;
+        Self { inside: inside.median(), outside: outside.median(), share }
     }
 
     fn stand_apart(&self) -> bool {
@@ -101,120 +95,5 @@ impl Sides {
 
     fn half_way(&self) -> i64 {
         (self.inside + self.outside).div_euclid(2)
-    }
-}
-
-/// The core of a region, the region itself where it has none, and the shell about its body.
-fn core_and_shell(region: Bits) -> (Bits, Bits) {
-    let mut core = complement(&region);
-    core = complement(&widened(&core));
-    let is_thin = core.words().iter().all(|&word| word == 0);
-    let (core, body) = if is_thin {
-        (region.clone(), region)
-    } else {
-        let body = widened(&core);
-        (core, body)
-    };
-    let mut near = body;
-    (0..SKIP).for_each(|_| near = widened(&near));
-    let mut shell = near.clone();
-    (0..DEPTH).for_each(|_| shell = widened(&shell));
-    shell.words_mut().iter_mut().zip(near.words()).for_each(|(shell, near)| *shell &= !near);
-    (core, shell)
-}
-
-fn complement(bits: &Bits) -> Bits {
-    let mut other = Bits::new(bits.shape());
-    let nx = bits.shape()[0];
-    for row in 0..bits.n_rows() {
-        other.fill_run(row, 0..nx);
-    }
-    other.words_mut().iter_mut().zip(bits.words()).for_each(|(other, bits)| *other &= !bits);
-    other
-}
-
-/// The voxels of `bits` and their neighbours over faces.
-fn widened(bits: &Bits) -> Bits {
-    let [nx, ny, _] = bits.shape();
-    let (n_rows, n_words) = (bits.n_rows(), bits.words_per_row());
-    let mut wide = Bits::new(bits.shape());
-    if n_words == 0 {
-        return wide;
-    }
-    let tail = u64::MAX >> (n_words * 64 - nx);
-    wide.words_mut().par_chunks_mut(n_words).enumerate().for_each(|(row, wide)| {
-        let (y, z) = (row % ny, row / ny);
-        let about = [(y > 0, row.wrapping_sub(1)), (y + 1 < ny, row + 1), (z > 0, row.wrapping_sub(ny))];
-        let about = about.into_iter().chain([(row + ny < n_rows, row + ny)]);
-        let line = bits.row(row);
-        for (i, word) in wide.iter_mut().enumerate() {
-            let before = if i > 0 { line[i - 1] >> 63 } else { 0 };
-            let after = if i + 1 < n_words { line[i + 1] << 63 } else { 0 };
-            *word = line[i] | line[i] << 1 | before | line[i] >> 1 | after;
-        }
-        for (_, other) in about.filter(|&(is_there, _)| is_there) {
-            wide.iter_mut().zip(bits.row(other)).for_each(|(word, other)| *word |= other);
-        }
-        wide[n_words - 1] &= tail;
-    });
-    wide
-}
-
-/// How many voxels need each level.
-struct Counts {
-    of_level: Vec<u64>,
-    n: u64,
-}
-
-impl Counts {
-    fn of(volume: &Volume, growth: &Growth, voxels: &Bits) -> Self {
-        let mut counts = Self { of_level: vec![0; 2 * REACH as usize + 1], n: 0 };
-        let grid = volume.grid();
-        for value in voxels.voxels().map(|voxel| volume.value(grid.index(voxel))) {
-            if let Some(level) = growth.level_of(value) {
-                counts.of_level[(level.clamp(-REACH, REACH) + REACH) as usize] += 1;
-                counts.n += 1;
-            }
-        }
-        counts
-    }
-
-    fn median(&self) -> i64 {
-        let mut n = 0;
-        let place = self.of_level.iter().position(|&count| {
-            n += count;
-            2 * n >= self.n.max(1)
-        });
-        place.map_or(0, |place| place as i64 - REACH)
-    }
-
-    fn share_up_to(&self, level: usize) -> f64 {
-        let end = (level as i64 + REACH + 1) as usize;
-        let n: u64 = self.of_level[..end].iter().sum();
-        n as f64 / self.n.max(1) as f64
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::flood::random_bits;
-
-    #[test]
-    fn widened_as_voxel_by_voxel() {
-        const ABOUT: [[i64; 3]; 7] =
-            [[0, 0, 0], [-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]];
-        for case in 0..200 {
-            let bits = random_bits(case);
-            let wide = widened(&bits);
-            let [nx, ny, nz] = bits.shape();
-            for index in 0..nx * ny * nz {
-                let voxel = [index % nx, index / nx % ny, index / (nx * ny)];
-                let at = |d: [i64; 3]| bits.contains([0, 1, 2].map(|axis| voxel[axis] as i64 + d[axis]));
-                assert_eq!(wide.get(voxel), ABOUT.into_iter().any(at), "case {case} {voxel:?}");
-            }
-            assert_eq!(complement(&complement(&bits)), bits);
-            assert_eq!(complement(&bits).count(), nx * ny * nz - bits.count(), "case {case}");
-        }
     }
 }

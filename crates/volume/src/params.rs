@@ -18,7 +18,8 @@ use crate::spacing::Spacing;
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
     /// What a scan shows, where nothing else is said: `"airway"` grows from the trachea, which it finds by itself, up
-    /// to the last threshold before the region leaks into the lung; `"vessel"` grows from a seed down to half-way
+    /// to a threshold clear of that at which the region leaks into the lung, and at darker values over edges and corners
+    /// too, for thin bronchi; `"vessel"` grows from a seed down to half-way
     /// between the values inside and those a few voxels outside, which it finds by itself, and never beyond a leak, or
     /// without a seed takes all from 150 HU on (vessels with contrast, and bone).
     /// Default: none, so that a scan is refused until a method is given. Keys that are set stay as they are; a mask
@@ -150,7 +151,8 @@ pub enum Method {
     Mask,
     /// Every voxel with a value in the band.
     Threshold,
-    /// The voxels in the band that are 6-connected with the seed. With a preset and no band, the band's end is found.
+    /// The voxels in the band that are 6-connected with the seed. With a preset and no band, the band's end is found, and
+    /// airways win thin bronchi over edges and corners.
     RegionGrow,
     /// Every voxel with a value of `label`.
     Label,

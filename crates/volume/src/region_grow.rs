@@ -2,10 +2,11 @@
 //!
 //! **Input** a volume, a seed voxel, a band of values; with a preset, both can be left open. **Output** one bit a
 //! voxel, and how the region grew.
-//! **Steps** 0. find the seed and the band's end where they are open: of airways the last threshold before the leak, of
+//! **Steps** 0. find the seed and the band's end where they are open: of airways clear of the leak, of
 //! vessels half-way from the values inside to those outside; 1. choose the voxels that lie in the band, ends
 //! included; 2. label their components by faces (6-connected); 3. keep the seed's.
-//! **Guarantees** the result is the 6-connected component of the band that holds the seed. No recursion.
+//! **Guarantees** the result is the 6-connected component of the band that holds the seed; only airways whose threshold was
+//! found win more over edges and corners, at darker values. No recursion.
 //! **Why not 26-connected?** An airway's wall is thinner than a voxel in places; over edges and corners the
 //! region leaks into the lung at the very same threshold.
 //! **Cost** O(voxels) time, two bits a voxel and the runs of the band.
@@ -19,7 +20,7 @@ use crate::kind::Census;
 use crate::runs::{Connectivity, Runs};
 use crate::select::Selection;
 use crate::trachea::SeedCandidate;
-use crate::{Error, Params, Preset, growth, half_maximum, trachea};
+use crate::{Error, Params, Preset, growth, half_maximum, margin, trachea};
 
 /// The seed of the parameters as a voxel inside the grid.
 pub(crate) fn seed_voxel(grid: &Grid, params: &Params) -> Result<[usize; 3], Error> {
@@ -41,8 +42,11 @@ pub(crate) fn seed_voxel(grid: &Grid, params: &Params) -> Result<[usize; 3], Err
 pub(crate) fn grow(volume: &Volume, params: &Params) -> Result<Selection, Error> {
     let mut report = Report::default();
     let (seed, seeds) = choose_seed(volume, params, &mut report)?;
-    let (growth, band) = choose_band(volume, params, seed, &mut report)?;
-    let bits = region(volume, seed, band)?;
+    let Chosen { growth, band, kept } = choose_band(volume, params, seed, &mut report)?;
+    let bits = match kept {
+        Some(bits) => bits,
+        None => region(volume, seed, band)?,
+    };
     let what = format!("the region in {} to {}", band.0, band.1);
     let mut selection = Selection { growth, seeds, ..Selection::of_scan(bits, band, what) };
     selection.report.extend(report);
@@ -73,19 +77,33 @@ fn choose_seed(
     Ok((best.voxel, candidates))
 }
 
+/// How far to grow.
+struct Chosen {
+    growth: Option<Growth>,
+    band: (f64, f64),
+    /// The region, where it is more than the seed's component of the band.
+    kept: Option<Bits>,
+}
+
+impl Chosen {
+    fn given(band: (f64, f64)) -> Self {
+        Self { growth: None, band, kept: None }
+    }
+}
+
 /// The band of the parameters; of an end that is not given, what the growth tells.
 fn choose_band(
     volume: &Volume,
     params: &Params,
     seed: [usize; 3],
     report: &mut Report,
-) -> Result<(Option<Growth>, (f64, f64)), Error> {
+) -> Result<Chosen, Error> {
     let band = params.band();
     let towards = match (params.lower, params.upper, params.preset) {
         (None, None, Some(preset)) => preset.towards(),
         (None, Some(_), _) => Towards::Bright,
         (Some(_), None, _) => Towards::Dark,
-        _ => return Ok((None, band)),
+        _ => return Ok(Chosen::given(band)),
     };
     let is_given = params.lower.is_some() || params.upper.is_some();
     let limit = match (towards, params.preset) {
@@ -102,27 +120,33 @@ fn choose_band(
         return Err(seed_error(volume, seed, (open_lower, open_upper)));
     }
     let mut growth = growth::measure(volume, seed, towards, limit);
-    if !is_given && towards == Towards::Dark {
-        growth.half_maximum = half_maximum::find(volume, seed, &growth);
+    let mut kept = None;
+    match towards {
+        _ if is_given => {}
+        Towards::Dark => growth.half_maximum = half_maximum::find(volume, seed, &growth),
+        Towards::Bright => {
+            let found = margin::find(volume, seed, &growth, limit);
+            (growth.margin, kept) = (found.as_ref().map(|found| found.0), found.map(|found| found.1));
+        }
     }
     count(&growth, report);
     if is_given {
         warn_of_leak(&growth, limit, report);
-        return Ok((Some(growth), band));
+        return Ok(Chosen { growth: Some(growth), ..Chosen::given(band) });
     }
     let threshold = match growth.half_maximum {
         // The seed is darker than most of the lumen: a speck of noise, or outside of it.
         Some(half) if half.level.is_none() => half.threshold,
         _ => growth.threshold().ok_or_else(|| no_knee(&growth))?,
     };
-    if growth.half_maximum.is_none() {
+    if growth.half_maximum.is_none() && (growth.margin.is_none() || growth.is_small()) {
         warn_of_no_leak(&growth, limit, report);
     }
     let band = match towards {
         Towards::Bright => (band.0, threshold),
         Towards::Dark => (threshold, band.1),
     };
-    Ok((Some(growth), band))
+    Ok(Chosen { growth: Some(growth), band, kept })
 }
 
 fn count(growth: &Growth, report: &mut Report) {
@@ -131,6 +155,13 @@ fn count(growth: &Growth, report: &mut Report) {
         report.count("stable_ml", growth.ml(stable));
         report.count("leaking_threshold", leaking.threshold);
         report.count("leaking_ml", growth.ml(leaking));
+    }
+    if let Some(margin) = growth.margin {
+        let threshold = |level: usize| growth.levels.get(level).map(|level| level.threshold);
+        if let Some(edges) = margin.edges.and_then(threshold) {
+            report.count("edges_threshold", edges);
+            report.count_usize("edges_voxels", margin.n_won);
+        }
     }
     if let Some(half) = growth.half_maximum {
         report.count("value_inside", half.inside);

@@ -43,8 +43,8 @@ pub struct Segmented {
     /// `component_largest_voxels`, `component_dropped_largest_voxels`, `cavities_filled`,
     /// `cavities_filled_voxels`, `tunnels`, `foreground_voxels`, `foreground_ml`. Where tunnels were closed also
     /// `tunnels_left`, `tunnel_repairs`, `tunnel_repairs_filled_voxels`, `tunnel_repairs_cleared_voxels`. Of a region
-    /// that grew also `stable_threshold`, `stable_ml`, `leaking_threshold`, `leaking_ml` where it leaks, and of
-    /// vessels `half_maximum`, `value_inside`, `value_outside` where these were found; of a seed that was found `seed_candidates`, `seed_voxel_x/y/z`, `seed_score`, `seed_score_of_next`.
+    /// that grew also `stable_threshold`, `stable_ml`, `leaking_threshold`, `leaking_ml` where it leaks, of airways
+    /// `edges_threshold`, `edges_voxels` where voxels were won over edges and corners, and of vessels `half_maximum`, `value_inside`, `value_outside` where these were found; of a seed that was found `seed_candidates`, `seed_voxel_x/y/z`, `seed_score`, `seed_score_of_next`.
     pub report: Report,
     /// The volume of a region that grew as a function of the threshold.
     pub growth: Option<Growth>,

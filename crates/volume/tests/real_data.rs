@@ -73,6 +73,9 @@ fn the_airway_grows_by_itself() {
     assert!((25.0..30.0).contains(&count("foreground_ml")), "{}", count("foreground_ml"));
     assert_eq!((count("stable_threshold"), count("leaking_threshold")), (-863.0, -862.0));
     assert!(count("leaking_ml") > 2.0 * count("stable_ml"));
+    // The last few HU have the beginning of the leak; over edges and corners bronchi go on.
+    assert!((-880.0..-863.0).contains(&count("band_upper")), "{}", count("band_upper"));
+    assert!((-960.0..-900.0).contains(&count("edges_threshold")) && count("edges_voxels") >= 30.0);
     // The trachea is in the top slices of this crop only; the main bronchus comes second.
     assert!(grown.seeds[0].voxel[2] > 95 && grown.seeds.len() > 1, "{:?}", grown.seeds);
     // At the leak's own threshold the region is what flooding it plainly gives.

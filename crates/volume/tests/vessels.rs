@@ -98,7 +98,7 @@ fn the_threshold_is_half_way_at_any_contrast() {
                 "{told}"
             );
             let table = found.growth.expect("it grew").to_tsv();
-            assert_eq!(table.lines().filter(|line| line.ends_with("\thalf")).count(), 1, "{told}");
+            assert_eq!(table.lines().filter(|line| line.ends_with("\ttaken")).count(), 1, "{told}");
         }
     }
 }

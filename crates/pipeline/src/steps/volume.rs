@@ -59,10 +59,17 @@ fn said_of_growth(growth: &Growth) -> String {
             level.threshold, half.threshold
         )
     });
+    let margin = growth.margin.map(|margin| {
+        let threshold = |level: usize| growth.levels.get(level).map_or(f64::NAN, |level| level.threshold);
+        let edges = margin.edges.map(|level| {
+            format!(", and {} voxels over edges and corners up to {}", margin.n_won, threshold(level))
+        });
+        format!("; grown to {}{}", threshold(margin.faces), edges.unwrap_or_default())
+    });
     let leak = growth.leak().map(|(stable, leaking)| {
         format!("; it leaks at {}, {} is the last before", leaking.threshold, stable.threshold)
     });
-    half.unwrap_or_default() + &leak.unwrap_or_default()
+    half.or(margin).unwrap_or_default() + &leak.unwrap_or_default()
 }
 
 /// The mask on its grid as a later stage would read it from the file.
