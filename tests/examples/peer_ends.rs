@@ -41,6 +41,7 @@ fn read(mask: &Path, peer: &Path) -> Result<(Tree, Mask), Box<dyn Error>> {
         components: espalier_volume::Components::All,
         fill_cavities: false,
         close_tunnels: false,
+        thick_slices: 0.0,
         ..params
     };
     let peer = espalier_volume::read_mask(peer, &options, &as_it_is)?.mask;

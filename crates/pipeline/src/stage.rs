@@ -119,7 +119,7 @@ impl Stage {
             Self::Radius | Self::Skeleton => 3,
             Self::Tree | Self::Embed | Self::Render => 4,
             Self::Report => 5,
-            Self::Volume => 6,
+            Self::Volume => 7,
         }
     }
 

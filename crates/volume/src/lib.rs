@@ -23,6 +23,7 @@
 //! | connected components by runs of voxels | `runs`, `components` |
 //! | cavities filled | `cavities` |
 //! | tunnels counted, and closed where they are faults | `euler`, `heal` |
+//! | what lies between thick slices | `thick` |
 //! | **[`segment`]**: `Volume` → [`Mask`](espalier_model::Mask) | `segment` |
 //! | **[`read_mask`]**: file → `Mask`, without holding the volume where values alone decide | `read_mask`, `stream` |
 //! | **[`survey()`]**: what a file is | `survey` |
@@ -77,6 +78,7 @@ mod euler;
 mod flood;
 mod heal;
 mod segment;
+mod thick;
 
 mod pieces;
 mod read_mask;

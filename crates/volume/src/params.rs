@@ -72,6 +72,13 @@ pub struct Params {
     /// two, faults of the mask, each of which would be a loop of the skeleton. Default true: loops hide tips from a
     /// skeleton. Tunnels that are left are cut in the tree.
     pub close_tunnels: bool,
+    /// From which thickness on slices are interpolated: an axis whose spacing is at least this multiple of the smallest
+    /// gets slices in between, by the shape of the mask on both sides, 2 to 16 to an old one. 1.2 to 1000, or 0 for never;
+    /// and never with `resample_mm` or with `orientation = "stored"`, which say what the grid is. Default 2.5: on phantoms
+    /// slices of 2.5 mm then lose a tenth of the tips that they lost, and the centreline of a rough one comes nearer to the
+    /// axis by 40 %; on slices twice as thick as wide rough ones lost a few more. The mask and all that follows are on the
+    /// new grid. Larger: only thicker slices are interpolated.
+    pub thick_slices: f64,
 }
 
 impl Default for Params {
@@ -91,6 +98,7 @@ impl Default for Params {
             orientation: Orientation::Ras,
             fill_cavities: true,
             close_tunnels: true,
+            thick_slices: 2.5,
         }
     }
 }
@@ -313,6 +321,9 @@ impl Params {
         ParamError::check("closing_mm", (0.0..=1e3).contains(&closing), message)?;
         let keeps_one = self.components.limit() > 0;
         ParamError::check("components", keeps_one, "must be a word or a number from 1, is 0")?;
+        let thick = self.thick_slices;
+        let is_legal = thick == 0.0 || (1.2..=1e3).contains(&thick);
+        ParamError::check("thick_slices", is_legal, format!("must be 0 or from 1.2 to 1000, is {thick}"))?;
         let least = self.min_component_ml;
         let message = format!("must be from 0 to 1e6, is {least}");
         ParamError::check("min_component_ml", (0.0..=1e6).contains(&least), message)

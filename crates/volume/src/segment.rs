@@ -21,7 +21,7 @@ use crate::select::{Selection, needs_preset, select};
 use crate::trachea::SeedCandidate;
 use crate::{
     Error, Method, Orientation, Params, ReadOptions, cavities, closing, components, heal, inspect_kind,
-    region_grow, resample,
+    region_grow, resample, thick,
 };
 
 /// How often places to close tunnels are looked for; on the masks at hand the second pass finds a few, the third
@@ -82,7 +82,9 @@ pub(crate) fn segment_within(volume: &Volume, params: &Params, max_bytes: u64) -
     };
     let mut params = params.clone();
     if wanted.is_some() {
+        // The spacing is the one that was wanted.
         params.resample_mm = None;
+        params.thick_slices = 0.0;
     }
     if resampled.is_some() && params.has_seed() {
         // A seed in voxels is meant on the file's own axes.
@@ -154,6 +156,7 @@ fn clean_within(mask: Mask, params: &Params, max_bytes: u64) -> Result<Segmented
     let stored_orientation = mask.grid().orientation();
     let file_axes = mask.grid().nearest_world_axes();
     let mut mask = in_order(mask, params.orientation)?;
+    let has_own_grid = params.resample_mm.is_none() && params.orientation == Orientation::Ras;
     if let Some(spacing) = params.resample_mm {
         // It is meant along the file's own axes, which may be others now.
         let spacing = match params.orientation {
@@ -164,60 +167,56 @@ fn clean_within(mask: Mask, params: &Params, max_bytes: u64) -> Result<Segmented
         mask = in_order(resample::mask(mask, spacing, max_bytes, &mut report)?, params.orientation)?;
     }
     let grid = mask.grid().clone();
-    let millilitres = |n_voxels: usize| n_voxels as f64 * grid.voxel_volume_mm3() / 1000.0;
     let mut bits = mask.into_bits();
     let n_selected = bits.count();
     report.count_usize("selected_voxels", n_selected);
-    report.count("selected_ml", millilitres(n_selected));
+    report.count("selected_ml", millilitres(n_selected, &grid));
 
     // Close gaps.
-    let mut closed = Vec::new();
+    let mut ledger = Ledger::default();
     if params.closing_mm > 0.0 {
         let filled = closing::close(&mut bits, &grid, params.closing_mm, max_bytes)?;
         report.count_usize("closing_patches", filled.n_patches);
         report.count_usize("closing_filled_voxels", filled.n_voxels);
-        closed = filled.entries;
+        ledger.0.extend(filled.entries);
     }
 
     // Drop components.
     let runs = Runs::cut(&bits);
     let (dropped, n_dropped) = components::keep(&mut bits, &runs, &grid, params, &mut report);
-    let mut ledger = Ledger(closed);
     ledger.0.extend(dropped.0);
     let runs = if n_dropped > 0 { Runs::cut(&bits) } else { runs };
 
-    // Fill cavities, and count tunnels, which closed cavities cannot be mistaken for.
-    let cavities = cavities::find(&runs, grid.shape());
-    let n_components = report.get("components").unwrap_or(0.0) as i64 - n_dropped as i64;
-    let n_tunnels = n_components + cavities.n_cavities as i64 - euler_number(&bits);
-    let mut filled = Filled::default();
-    if params.fill_cavities {
-        filled.fill(&mut bits, &cavities);
+    // Fill cavities, close tunnels that are faults of the mask; and once more between slices.
+    let mut mended = Mended::default();
+    let n_components = report.get("components").unwrap_or(0.0) as usize - n_dropped;
+    let n_tunnels = mended.mend(&mut bits, (&runs, n_components), &grid, params);
+    let mut mask = Mask::new(grid, bits);
+    if has_own_grid && params.thick_slices > 0.0 && mask.n_foreground() > 0 {
+        let from = mask.grid().shape();
+        mask = thick::refine(mask, (params.thick_slices, max_bytes), &mut report)?;
+        if mask.grid().shape() != from {
+            mask = in_order(mask, params.orientation)?;
+            let (grid, mut bits) = (mask.grid().clone(), mask.into_bits());
+            let runs = Runs::cut(&bits);
+            let n_components = runs.components(Connectivity::All).n_components;
+            mended.mend(&mut bits, (&runs, n_components), &grid, params);
+            mask = Mask::new(grid, bits);
+        }
     }
-    // Close tunnels that are faults of the mask, and fill what that closes in.
-    let healed =
-        (params.close_tunnels && n_tunnels > 0).then(|| close_tunnels(&mut bits, &grid, params, &mut filled));
-    if params.fill_cavities {
-        report.count_usize("cavities_filled", filled.n_cavities);
-        report.count_usize("cavities_filled_voxels", filled.n_voxels);
-    }
-    report.count("tunnels", n_tunnels as f64);
-    if let Some((healed, n_left)) = healed {
-        report.count("tunnels_left", n_left as f64);
-        report.count_usize("tunnel_repairs", healed.n_patches);
-        report.count_usize("tunnel_repairs_filled_voxels", healed.n_filled);
-        report.count_usize("tunnel_repairs_cleared_voxels", healed.n_cleared);
-        ledger.0.extend(healed.entries);
-    }
-    let mask = Mask::new(grid.clone(), bits);
+    mended.describe(n_tunnels, params, (&mut ledger, &mut report));
     let n_foreground = mask.n_foreground();
     if n_foreground == 0 {
         let what = "the mask after cleaning".to_owned();
         return Err(Error::Empty { what, min: 0.0, max: 1.0 });
     }
     report.count_usize("foreground_voxels", n_foreground);
-    report.count("foreground_ml", millilitres(n_foreground));
+    report.count("foreground_ml", millilitres(n_foreground, mask.grid()));
     Ok(Segmented { mask, stored_orientation, ledger, report, growth: None, seeds: Vec::new() })
+}
+
+fn millilitres(n_voxels: usize, grid: &Grid) -> f64 {
+    n_voxels as f64 * grid.voxel_volume_mm3() / 1000.0
 }
 
 /// The mask in the axis order that is wanted.
@@ -231,40 +230,75 @@ pub fn in_order(mask: Mask, orientation: Orientation) -> Result<Mask, Error> {
     }
 }
 
-/// Cavities that were filled.
+/// Cavities that were filled, and tunnels that were closed.
 #[derive(Default)]
-struct Filled {
+struct Mended {
     n_cavities: usize,
-    n_voxels: usize,
+    n_filled: usize,
+    healed: Healed,
+    /// The tunnels left, where any were to be closed.
+    n_left: Option<i64>,
 }
 
-impl Filled {
+impl Mended {
+    /// Fills cavities and closes tunnels of a mask; returns how many tunnels it had. Cavities are filled first: closed
+    /// ones cannot be mistaken for tunnels.
+    fn mend(
+        &mut self,
+        bits: &mut Bits,
+        (runs, n_components): (&Runs, usize),
+        grid: &Grid,
+        params: &Params,
+    ) -> i64 {
+        let cavities = cavities::find(runs, grid.shape());
+        let n_tunnels = (n_components + cavities.n_cavities) as i64 - euler_number(bits);
+        if params.fill_cavities {
+            self.fill(bits, &cavities);
+        }
+        if params.close_tunnels && n_tunnels > 0 {
+            self.close_tunnels(bits, grid, params);
+        }
+        n_tunnels
+    }
+
     fn fill(&mut self, bits: &mut Bits, cavities: &Cavities) {
         cavities::fill(bits, cavities);
         self.n_cavities += cavities.n_cavities;
-        self.n_voxels += cavities.n_voxels;
+        self.n_filled += cavities.n_voxels;
     }
-}
 
-/// Closes tunnels, and fills what that may have closed in, until no place is left to be changed; also tells how many
-/// tunnels are left.
-fn close_tunnels(bits: &mut Bits, grid: &Grid, params: &Params, filled: &mut Filled) -> (Healed, i64) {
-    let mut all = Healed::default();
-    let mut n_left = 0;
-    for _ in 0..MAX_PASSES {
-        let healed = heal::heal(bits, grid);
-        let runs = Runs::cut(bits);
-        let cavities = cavities::find(&runs, grid.shape());
-        let n_components = runs.components(Connectivity::All).n_components;
-        n_left = (n_components + cavities.n_cavities) as i64 - euler_number(bits);
-        if params.fill_cavities {
-            filled.fill(bits, &cavities);
-        }
-        let is_done = healed.n_patches == 0 || n_left == 0;
-        all.add(healed);
-        if is_done {
-            break;
+    /// Closes tunnels, and fills what that may have closed in, until no place is left to be changed.
+    fn close_tunnels(&mut self, bits: &mut Bits, grid: &Grid, params: &Params) {
+        for _ in 0..MAX_PASSES {
+            let healed = heal::heal(bits, grid);
+            let runs = Runs::cut(bits);
+            let cavities = cavities::find(&runs, grid.shape());
+            let n_components = runs.components(Connectivity::All).n_components;
+            let n_left = (n_components + cavities.n_cavities) as i64 - euler_number(bits);
+            if params.fill_cavities {
+                self.fill(bits, &cavities);
+            }
+            let is_done = healed.n_patches == 0 || n_left == 0;
+            self.healed.add(healed);
+            self.n_left = Some(n_left);
+            if is_done {
+                break;
+            }
         }
     }
-    (all, n_left)
+
+    fn describe(self, n_tunnels: i64, params: &Params, (ledger, report): (&mut Ledger, &mut Report)) {
+        if params.fill_cavities {
+            report.count_usize("cavities_filled", self.n_cavities);
+            report.count_usize("cavities_filled_voxels", self.n_filled);
+        }
+        report.count("tunnels", n_tunnels as f64);
+        if let Some(n_left) = self.n_left {
+            report.count("tunnels_left", n_left as f64);
+            report.count_usize("tunnel_repairs", self.healed.n_patches);
+            report.count_usize("tunnel_repairs_filled_voxels", self.healed.n_filled);
+            report.count_usize("tunnel_repairs_cleared_voxels", self.healed.n_cleared);
+            ledger.0.extend(self.healed.entries);
+        }
+    }
 }

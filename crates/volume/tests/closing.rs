@@ -17,6 +17,7 @@ fn closing(radius_mm: f64) -> Params {
         components: Components::All,
         fill_cavities: false,
         close_tunnels: false,
+        thick_slices: 0.0,
         ..Params::default()
     }
 }

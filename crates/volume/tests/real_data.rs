@@ -151,7 +151,12 @@ fn masks_are_counted_as_scipy_counts_them() {
         let loaded = load(&format!("{name}.nii.gz")).expect("data is set");
         assert!(matches!(inspect_kind(&loaded.volume), Kind::Mask { .. }), "{name}");
         assert_eq!(loaded.volume.grid().orientation(), orientation, "{name}");
-        let params = Params { components: Components::Largest, close_tunnels: false, ..Params::default() };
+        let params = Params {
+            components: Components::Largest,
+            close_tunnels: false,
+            thick_slices: 0.0,
+            ..Params::default()
+        };
         let segmented = segment(&loaded.volume, &params).expect("a mask");
         let count = |key| segmented.report.get(key).unwrap_or(f64::NAN) as usize;
         let found = (
@@ -175,7 +180,8 @@ fn two_lungs_stay() {
     }
     for (name, _, (_, n_components, largest, _)) in MASKS {
         let loaded = load(&format!("{name}.nii.gz")).expect("data is set");
-        let params = Params { close_tunnels: false, fill_cavities: false, ..Params::default() };
+        let params =
+            Params { close_tunnels: false, fill_cavities: false, thick_slices: 0.0, ..Params::default() };
         let segmented = segment(&loaded.volume, &params).expect("a mask");
         let (n_kept, n_voxels) = match name {
             "medmpd_lungs2_vessels" => (3, 160_883 + 107_612 + 19_105),

@@ -41,7 +41,7 @@ fn a_ball_stays_where_it_is_and_as_large() {
     let centre = DVec3::new(25.0, -5.0, 46.0);
     let ball_ml = 4.0 / 3.0 * std::f64::consts::PI * 1.0;
     let ct = scan(&thick, |point| 1000.0 - 100.0 * (point - centre).length());
-    let band = Params { method: Method::Threshold, lower: Some(0.0), ..Params::default() };
+    let band = Params { method: Method::Threshold, lower: Some(0.0), thick_slices: 0.0, ..Params::default() };
     for spacing in [Spacing::Isotropic, Spacing::Cubic(0.5), Spacing::Each([0.8, 0.9, 1.0])] {
         let resampled = done(segment(&ct, &Params { resample_mm: Some(spacing), ..band.clone() }));
         let (place, ml) = middle(&resampled.mask);

@@ -2,7 +2,9 @@
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
 use espalier_model::{Diagnose, Grid, LedgerKind, Volume, Voxels};
-use espalier_volume::{Components, Error, Kind, Method, Params, Preset, Segmented, inspect_kind, segment};
+use espalier_volume::{
+    Components, Error, Kind, Method, Orientation, Params, Preset, Segmented, Spacing, inspect_kind, segment,
+};
 use glam::DVec3;
 use ndarray::Array3;
 
@@ -26,7 +28,8 @@ fn picture(segmented: &Segmented) -> String {
 }
 
 fn check(text: &str, params: &Params, expected: &str) -> Segmented {
-    let segmented = segment(&volume(text), params).unwrap_or_else(|error| panic!("{error}"));
+    let params = Params { thick_slices: 0.0, ..params.clone() };
+    let segmented = segment(&volume(text), &params).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(picture(&segmented), expected);
     segmented
 }
@@ -89,7 +92,7 @@ fn the_seed_is_told_where_to_go() {
 fn components_and_their_ledger() {
     // Corners connect; the lone voxels at the ends do not.
     let text = "7....7 .7...7 7....7";
-    let one = Params { components: Components::Largest, ..Params::default() };
+    let one = Params { components: Components::Largest, thick_slices: 0.0, ..Params::default() };
     let largest = check(text, &one, "#..... .#.... #.....");
     assert_eq!(largest.report.get("components"), Some(2.0));
     assert_eq!(largest.report.get("components_dropped_voxels"), Some(3.0));
@@ -97,7 +100,7 @@ fn components_and_their_ledger() {
     let entry = &largest.ledger.0[0];
     assert_eq!((entry.kind, entry.position_mm), (LedgerKind::ComponentDropped, DVec3::new(15.0, 12.0, 10.0)));
     assert_eq!(entry.reason, "component of 3 voxels, 0.0300 ml; the 1 largest stay");
-    let both = Params { components: Components::Count(2), ..Params::default() };
+    let both = Params { components: Components::Count(2), thick_slices: 0.0, ..Params::default() };
     assert!(check(text, &both, "#....# .#...# #....#").ledger.0.is_empty());
 
     // 250 single voxels beside a pair: 200 entries and one for the other 50.
@@ -148,12 +151,14 @@ fn cavities() {
     let hollow = "....... .77777. .7...7. .77777. .......";
     let empty = "....... ....... ....... ....... .......";
     let closed = [empty, shell, hollow, shell, empty].join("\n\n");
-    let filled = segment(&volume(&closed), &Params::default()).expect("a mask");
+    let filled =
+        segment(&volume(&closed), &Params { thick_slices: 0.0, ..Params::default() }).expect("a mask");
     assert_eq!(filled.report.get("cavities_filled"), Some(1.0));
     assert_eq!(filled.report.get("cavities_filled_voxels"), Some(3.0));
     assert_eq!(filled.mask.n_foreground(), 45);
     let kept =
-        segment(&volume(&closed), &Params { fill_cavities: false, ..Params::default() }).expect("a mask");
+        segment(&volume(&closed), &Params { fill_cavities: false, thick_slices: 0.0, ..Params::default() })
+            .expect("a mask");
     assert_eq!((kept.mask.n_foreground(), kept.report.get("cavities_filled")), (42, None));
     // A hole in the shell: background over a face is a way out, over an edge it is not.
     let open = "....... .77777. .7...7. .77.77. .......";
@@ -313,4 +318,27 @@ fn cavities_that_closing_a_tunnel_makes_are_counted() {
     let n_added = cleaned.mask.n_foreground() - mask.n_foreground();
     let n_told = ["cavities_filled_voxels", "tunnel_repairs_filled_voxels"].map(count);
     assert_eq!(n_told.into_iter().flatten().sum::<f64>(), n_added as f64);
+}
+
+/// A branch aslant through thick slices: interpolated, unless the grid was said to be another.
+#[test]
+fn thick_slices_are_interpolated_unless_the_grid_is_given() {
+    let text = "1110000 1110000\n\n0111000 0111000\n\n0011100 0011100";
+    let size = |params: &Params| {
+        let segmented = segment(&volume(text), params).unwrap_or_else(|error| panic!("{error}"));
+        (segmented.mask.grid().shape(), segmented.report.get("thick_slices_to_voxels"))
+    };
+    // Voxels of 1 × 2 × 5 mm.
+    let default = Params::default();
+    assert_eq!(size(&default), ([7, 2, 15], Some(210.0)));
+    let own = ([7, 2, 3], None);
+    assert_eq!(size(&Params { thick_slices: 0.0, ..default.clone() }), own);
+    assert_eq!(size(&Params { thick_slices: 6.0, ..default.clone() }), own);
+    assert_eq!(size(&Params { orientation: Orientation::Stored, ..default.clone() }), own);
+    let resample_mm = Some(Spacing::Each([1.0, 2.0, 5.0]));
+    assert_eq!(size(&Params { resample_mm, ..default }), own);
+    for illegal in [-1.0, 0.5, 1.19, 1e4, f64::NAN] {
+        let params = Params { thick_slices: illegal, ..Params::default() };
+        assert_eq!(code(text, &params), "E-PARAM 2", "{illegal}");
+    }
 }

@@ -8,7 +8,7 @@ const BANDS_VOXELS: [f64; 5] = [1.5, 2.0, 3.0, 4.0, f64::INFINITY];
 
 /// One line: for each band of true diameters at the tips, how many of them were found.
 pub(crate) fn print(measured: &Measured) {
-    let (truth, spacing_mm) = (&measured.truth, measured.mask.grid().spacing_mm());
+    let (truth, spacing_mm) = (&measured.truth, glam::DVec3::from_array(measured.case.spacing_mm));
     let voxel_mm = cbrt(spacing_mm.element_product());
     let diameter = |tip: usize| 2.0 * truth.nodes()[tip].radius_mm / voxel_mm;
     let (tips, lost) = (free_ends(truth), lost_tips(truth, &measured.built.tree, spacing_mm));

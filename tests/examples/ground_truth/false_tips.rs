@@ -12,7 +12,7 @@ use crate::lost_tips::nearest_entry;
 pub(crate) fn print(measured: &Measured) {
     let (truth, found) = (&measured.truth, &measured.built.tree);
     let branches = found.branches();
-    for tip in false_tips(truth, found, measured.mask.grid().spacing_mm()) {
+    for tip in false_tips(truth, found, measured.case.spacing_mm.into()) {
         let place = found.position_mm(tip);
         let branch = branches.of_node(tip).unwrap_or(0);
         println!(

@@ -12,9 +12,9 @@ use glam::DVec3;
 pub(crate) fn print(measured: &Measured) {
     let (truth, found) = (&measured.truth, &measured.built.tree);
     let grid = measured.mask.grid();
-    let voxel_mm = cbrt(grid.voxel_volume_mm3());
+    let voxel_mm = cbrt(measured.case.spacing_mm.iter().product());
     let place_of = |voxel: [f64; 3]| grid.world_from_voxel().transform_point3(DVec3::from_array(voxel));
-    for tip in lost_tips(truth, found, grid.spacing_mm()) {
+    for tip in lost_tips(truth, found, measured.case.spacing_mm.into()) {
         let place = truth.position_mm(tip);
         let to_curve = |(a, b): (usize, usize)| {
             let (a, b) = (found.position_mm(a), found.position_mm(b));
