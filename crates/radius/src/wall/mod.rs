@@ -45,6 +45,8 @@ const LEAST_SHARE: f64 = 0.5;
 /// Points are rounded to such parts of a voxel: of numbers of single precision the weighted sum is then exact, and the same in
 /// whatever order a file stores its axes.
 const PARTS: f64 = 256.0;
+/// Lengths of voxels are rounded to such parts of a millimetre, for the same reason.
+const ROUNDING: f64 = 1_048_576.0;
 /// How often the walls are smoothed along the skeleton.
 const N_SMOOTHINGS: usize = 2;
 
@@ -60,6 +62,9 @@ pub(crate) struct Place {
 pub(crate) struct Scan<'a> {
     background: Background<'a>,
     volume: &'a Volume,
+    /// How long a voxel is along each axis of the mask's grid: the mask's or the scan's, whichever is longer. A mask on thick
+    /// slices has others in between, which the scan has not.
+    spacing: DVec3,
     /// From grid mm of the mask to voxels of the scan.
     voxel_from_mm: DAffine3,
 }
@@ -81,7 +86,13 @@ impl<'a> Scan<'a> {
         let voxel_from_mm = volume.grid().voxel_from_world()
             * grid.world_from_voxel()
             * DAffine3::from_scale(background.spacing_mm().recip());
-        Self { background, volume, voxel_from_mm }
+        // Rounded, so that the order of a file's axes makes no difference.
+        let spacing_mm = |axis: DVec3| {
+            let length_mm = voxel_from_mm.transform_vector3(axis).length().recip();
+            (length_mm * ROUNDING).round() / ROUNDING
+        };
+        let of_scan = DVec3::new(spacing_mm(DVec3::X), spacing_mm(DVec3::Y), spacing_mm(DVec3::Z));
+        Self { background, volume, spacing: background.spacing_mm().max(of_scan), voxel_from_mm }
     }
 
     /// The walls at `places`, those without a direction among them; `neighbors` tells which follow each other.
@@ -107,7 +118,7 @@ impl<'a> Scan<'a> {
     fn noise(&self, places: &[Option<Place>]) -> f64 {
         /// The standard deviation over the median of the difference's absolute value, of two normal values.
         const PER_MEDIAN: f64 = 1.048;
-        let step_mm = 2.0 * self.background.spacing_mm().max_element();
+        let step_mm = 2.0 * self.spacing.max_element();
         let difference = |place: &Place| {
             Some((self.value(place.center)? - self.value(place.center + place.tangent * step_mm)?).abs())
         };

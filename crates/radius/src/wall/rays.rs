@@ -60,8 +60,7 @@ impl Section {
 impl Scan<'_> {
     /// The section at a place; none where the scan or the mask has nothing to show there.
     pub(super) fn section(&self, place: Place) -> Option<Section> {
-        let spacing = self.background.spacing_mm();
-        let step_mm = spacing.min_element() / PER_VOXEL;
+        let step_mm = self.spacing.min_element() / PER_VOXEL;
         let (right, up) = plane_axes(place.tangent, DVec3::Z);
         let fine: Vec<Option<Ray>> = (0..N_FINE)
             .map(|i| {
@@ -83,9 +82,8 @@ impl Scan<'_> {
 
     /// The mean of the lines along `way` in each plane.
     fn ray(&self, place: Place, way: DVec3, step_mm: f64) -> Option<Ray> {
-        let spacing = self.background.spacing_mm();
-        let voxel_mm = (way * spacing).length();
-        let along_mm = place.tangent.abs().dot(spacing);
+        let voxel_mm = (way * self.spacing).length();
+        let along_mm = place.tangent.abs().dot(self.spacing);
         let n_most = ((LIMIT_RADII * place.radius_mm + voxel_mm) / step_mm) as usize;
         let starts: Vec<DVec3> = (0..N_PLANES)
             .map(|plane| place.center + place.tangent * along_mm * f64::from(plane - N_PLANES / 2))
