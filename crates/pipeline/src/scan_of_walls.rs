@@ -1,8 +1,8 @@
 //! The scan in which radii look for walls: whether there is one, and as much of it as the mask needs.
 //!
 //! **Input** the config; later the mask. **Output** the part of the scan around the mask.
-//! **Guarantees** a run that asks for a scan and will have none ends before its first stage; one that does not ask for it
-//! keeps to the mask. Memory is the box of the organ with what a search for its wall reads around it, 4 bytes a voxel.
+//! **Guarantees** a run that asks for a scan and will have none, by what its config says, ends before its first stage; one that
+//! does not ask for it keeps to the mask. Memory is the box of the organ with what a search for its wall reads around it, 4 bytes a voxel.
 
 use espalier_model::diagnose::{Class, Diagnose};
 use espalier_model::{Mask, Report, Volume};
@@ -23,11 +23,8 @@ const MARGIN_VOXELS: f64 = 6.0;
 #[derive(Debug, Error)]
 pub(crate) enum NoScan {
     /// The run begins with something else.
-    #[error("radius.wall = \"scan\" looks for walls in a scan, but the input is {what}")]
-    Input {
-        /// What it is.
-        what: &'static str,
-    },
+    #[error("radius.wall = \"scan\" looks for walls in a scan, but the input is a mask or a label map")]
+    Input,
     /// The file is no scan.
     #[error("it has no walls to look for: it is {what}")]
     Flat {
@@ -42,13 +39,13 @@ pub(crate) enum NoScan {
 impl Diagnose for NoScan {
     fn code(&self) -> &'static str {
         match self {
-            Self::Input { .. } | Self::Flat { .. } => "E-RADIUS-NO-SCAN",
+            Self::Input | Self::Flat { .. } => "E-RADIUS-NO-SCAN",
             Self::Elsewhere => "E-RADIUS-ELSEWHERE",
         }
     }
 
     fn class(&self) -> Class {
-        if matches!(self, Self::Input { .. }) { Class::Usage } else { Class::Input }
+        if matches!(self, Self::Input) { Class::Usage } else { Class::Input }
     }
 
     fn hint(&self) -> String {
@@ -74,9 +71,7 @@ pub(crate) fn check(config: &Config, source: &Source) -> Result<(), NoScan> {
     if has_scan || config.radius.wall != Wall::Scan {
         return Ok(());
     }
-    Err(NoScan::Input {
-        what: if matches!(source, Source::Volume(_)) { "a mask or a label map" } else { "a traced tree" },
-    })
+    Err(NoScan::Input)
 }
 
 /// Whether radii are looked for in any scan.
@@ -104,8 +99,8 @@ pub(crate) fn around(step: &mut Step<'_>, mask: &Mask) -> Result<Option<(Volume,
     let what = match cropped.kind {
         Kind::Mask { .. } => Some("a mask"),
         Kind::Constant { .. } => Some("one value everywhere"),
-        Kind::Labels { .. } => Some("a label map"),
-        Kind::Ct { .. } => None,
+        // Few whole values are a scan's too, if somebody says that it is one.
+        Kind::Labels { .. } | Kind::Ct { .. } => None,
     };
     match (cropped.volume, what) {
         (Some(volume), None) => Ok(Some((volume, cropped.report))),

@@ -4,7 +4,7 @@ use espalier_model::Diagnose;
 use espalier_model::diagnose::Class;
 
 /// Why radii cannot be measured.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// Mask and skeleton lie on different grids.
@@ -27,6 +27,14 @@ pub enum Error {
         /// The first such voxel (x, y, z).
         voxel: [u32; 3],
     },
+    /// Voxels so much longer than wide that no sphere can be measured.
+    #[error("voxels are {ratio:.0} times as long as wide ({} x {} x {} mm): that is no scan's", .spacing_mm[0], .spacing_mm[1], .spacing_mm[2])]
+    Uneven {
+        /// The longest side over the shortest.
+        ratio: f64,
+        /// The spacing.
+        spacing_mm: [f64; 3],
+    },
     /// The distances of all voxels need more memory than allowed.
     #[error("the distances of all voxels need {needed} bytes of memory, allowed are {limit}")]
     FieldTooLarge {
@@ -42,6 +50,7 @@ impl Diagnose for Error {
         match self {
             Self::GridMismatch { .. } => "E-RADIUS-GRID",
             Self::EmptySkeleton => "E-RADIUS-EMPTY",
+            Self::Uneven { .. } => "E-RADIUS-UNEVEN",
             Self::OutsideMask { .. } => "E-RADIUS-OUTSIDE-MASK",
             Self::FieldTooLarge { .. } => "E-RADIUS-FIELD-TOO-LARGE",
         }
@@ -50,7 +59,10 @@ impl Diagnose for Error {
     fn class(&self) -> Class {
         match self {
             Self::FieldTooLarge { .. } => Class::Limit,
-            Self::GridMismatch { .. } | Self::EmptySkeleton | Self::OutsideMask { .. } => Class::Input,
+            Self::GridMismatch { .. }
+            | Self::EmptySkeleton
+            | Self::OutsideMask { .. }
+            | Self::Uneven { .. } => Class::Input,
         }
     }
 
@@ -60,6 +72,9 @@ impl Diagnose for Error {
                 "give the mask that the skeleton was thinned from".to_owned()
             }
             Self::FieldTooLarge { .. } => "raise --max-memory, or leave radius.field off".to_owned(),
+            Self::Uneven { .. } => {
+                "check the spacing in the header, or take other voxels with volume.resample_mm".to_owned()
+            }
             Self::EmptySkeleton => "thin with thinning = \"safe\", which lets nothing vanish".to_owned(),
         }
     }

@@ -35,8 +35,10 @@ pub use params::{Params, Rule, Wall};
 use nearest::Background;
 use ridge::OnAxis;
 
-/// A wall lies inside the mask's surface by at most this share of the radius: that a voxel was chosen is evidence too.
-const MOST_NARROWING: f64 = 0.5;
+/// Voxels may be so many times as long as wide: the search for sections grows with the square of it.
+const MOST_UNEVEN: f64 = 1000.0;
+/// The share of places that must show a wall; with fewer the scan is too noisy, or another's, and what it shows is chance.
+const LEAST_SEEN: f64 = 0.5;
 
 /// The inscribed spheres of a skeleton and what their making did.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,6 +56,7 @@ pub struct Measured {
 /// [`Error::GridMismatch`] if the two have different grids, [`Error::EmptySkeleton`], and [`Error::OutsideMask`]
 /// at the first skeleton voxel that is background.
 pub fn inscribed_spheres(mask: &Mask, skeleton: &Skeleton, params: &Params) -> Result<Measured, Error> {
+    check_spacing(mask)?;
     let distances_mm = distances_mm(mask, skeleton)?;
     let tangents = tangent::along(skeleton, &tangent::neighbors(skeleton), &distances_mm);
     let spheres: Vec<Sphere> = (0..skeleton.voxels().len())
@@ -67,8 +70,8 @@ pub fn inscribed_spheres(mask: &Mask, skeleton: &Skeleton, params: &Params) -> R
 /// The spheres of a mask, as [`inscribed_spheres`] has measured them, with the wall where `scan` shows it.
 ///
 /// The report counts `walls` (places that show one), `wall_beyond_mean_mm`, and what the scan's thick branches say:
-/// `lumen_value`, `wall_value` (of dark lumina; of bright ones what is around them), `blur_mm`. A warning where half of the
-/// places or more show no wall.
+/// `lumen_value`, `wall_value` (of dark lumina; of bright ones what is around them), `blur_mm`. Where fewer than half of the
+/// places show a wall the radii keep to the mask, with a warning.
 ///
 /// # Errors
 /// As [`inscribed_spheres`].
@@ -76,6 +79,7 @@ pub fn walls(
     (mask, skeleton): (&Mask, &Skeleton),
     spheres: &InscribedSpheres,
     scan: &Volume,
+    params: &Params,
 ) -> Result<Measured, Error> {
     let distances_mm = distances_mm(mask, skeleton)?;
     let neighbors = tangent::neighbors(skeleton);
@@ -89,26 +93,28 @@ pub fn walls(
     };
     let places: Vec<Option<wall::Place>> = spheres.0.iter().zip(&tangents).map(place).collect();
     let found = wall::Scan::new((background, mask.grid()), scan).walls(&places, &neighbors);
-    let with_wall = |(sphere, wall_mm): (&Sphere, &f64)| Sphere {
-        wall_mm: wall_mm.max(-MOST_NARROWING * sphere.radius_mm),
-        ..*sphere
+    let is_seen = found.n_seen as f64 >= LEAST_SEEN * spheres.0.len() as f64;
+    // The wall in the scan is where it is, whatever was added to the mask's radii.
+    let offset_mm = params.offset_voxels * background.spacing_mm().min_element();
+    let with_wall = |(sphere, beyond_mm): (&Sphere, &f64)| {
+        let wall_mm = if is_seen { (beyond_mm - offset_mm).max(-sphere.radius_mm) } else { 0.0 };
+        Sphere { wall_mm, ..*sphere }
     };
     let spheres: Vec<Sphere> = spheres.0.iter().zip(&found.beyond_mm).map(with_wall).collect();
-    let report = report_of_walls(&found);
+    let report = report_of_walls(&found, (is_seen, &spheres));
     Ok(Measured { spheres: InscribedSpheres(spheres), report })
 }
 
-fn report_of_walls(found: &wall::Walls) -> Report {
-    let (mut report, n) = (Report::default(), found.beyond_mm.len());
+fn report_of_walls(found: &wall::Walls, (is_seen, spheres): (bool, &[Sphere])) -> Report {
+    let (mut report, n) = (Report::default(), spheres.len());
     report.count_usize("walls", found.n_seen);
-    report.count("wall_beyond_mean_mm", found.beyond_mm.iter().sum::<f64>() / n as f64);
+    report.count("wall_beyond_mean_mm", spheres.iter().map(|sphere| sphere.wall_mm).sum::<f64>() / n as f64);
     report.count("lumen_value", found.lumen);
     report.count("wall_value", found.wall);
     report.count("blur_mm", found.blur_mm);
-    if 2 * found.n_seen <= n {
+    if !is_seen {
         let message = format!(
-            "the scan shows the wall at {} of {n} places of the skeleton; the radii of the others follow from their \
-             neighbours', or from the mask: radius.wall = \"mask\" keeps to the mask",
+            "the scan shows a wall at {} of {n} places of the skeleton only: the radii keep to the mask",
             found.n_seen
         );
         report.warn("W-RADIUS-WALL", message);
@@ -139,6 +145,12 @@ fn check(mask: &Mask, skeleton: &Skeleton) -> Result<(), Error> {
         Some(&voxel) => Err(Error::OutsideMask { voxel }),
         None => Ok(()),
     }
+}
+
+fn check_spacing(mask: &Mask) -> Result<(), Error> {
+    let spacing = mask.grid().spacing_mm();
+    let ratio = spacing.max_element() / spacing.min_element();
+    if ratio <= MOST_UNEVEN { Ok(()) } else { Err(Error::Uneven { ratio, spacing_mm: spacing.to_array() }) }
 }
 
 /// The sphere of one skeleton voxel, whose own distance and direction are known.

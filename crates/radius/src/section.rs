@@ -7,7 +7,7 @@
 //! 2. Flood it from the voxel over faces. A voxel counts by its share in the slab, as if it reached along the direction as
 //! far as its box does: so sums do not depend on how the grid lies. 3. Area = volume / thickness.
 //! **Guarantees** none where the flood reaches [`LIMIT_RADII`] · r from the point: there the slab runs along another
-//! branch, or the mask is no tube.
+//! branch, or the mask is no tube; nor where the search would need more than [`MOST_CELLS`].
 //! **Why not one plane?** In tubes of one to two voxels its centroid jumps from voxel to voxel: the centreline came out
 //! 0.18 voxel off the axis, with three voxels 0.15.
 //! **Cost** O(voxels of the slab).
@@ -26,6 +26,8 @@ const LIMIT_RADII: f64 = 3.0;
 const MIN_SPACINGS: f64 = 0.75;
 /// The sides of a pit on which there is foreground; a voxel beside a smooth convex wall has three at most.
 const LEAST_SIDES: usize = 4;
+/// The largest box that is searched, in voxels: four megabytes. No tube needs as many.
+const MOST_CELLS: f64 = 3.2e7;
 /// Bits in a word.
 const WORD: usize = u64::BITS as usize;
 
@@ -61,7 +63,7 @@ pub(crate) fn through(
     let thickness_mm = HALF_SLAB * (tangent.abs() * spacing).max_element();
     let half_mm = thickness_mm.min(background.free_mm(point, tangent)).max(0.5 * depth_mm);
 
-    let mut seen = Seen::about((DVec3::splat(limit_mm) + half_mm) / spacing);
+    let mut seen = Seen::about((DVec3::splat(limit_mm) + half_mm) / spacing)?;
     let mut stack = vec![(start, seen.center)];
     seen.insert(seen.center);
     let (first, second) = tangent.any_orthonormal_pair();
@@ -142,11 +144,15 @@ struct Seen {
 }
 
 impl Seen {
-    /// A box that reaches from its centre by `reach` voxels, and farther than a step beyond.
-    fn about(reach: DVec3) -> Self {
-        let [nx, ny, nz] = (reach + 3.0).to_array().map(|r| 2 * r as usize + 1);
+    /// A box that reaches from its centre by `reach` voxels, and farther than a step beyond; none that is too large.
+    fn about(reach: DVec3) -> Option<Self> {
+        let sides = 2.0 * (reach + 3.0).floor() + 1.0;
+        if sides.element_product() > MOST_CELLS {
+            return None;
+        }
+        let [nx, ny, nz] = sides.to_array().map(|side| side as usize);
         let strides = [1, nx, nx * ny];
-        Self { center: (nx * ny * nz) / 2, strides, words: vec![0; (nx * ny * nz).div_ceil(WORD)] }
+        Some(Self { center: (nx * ny * nz) / 2, strides, words: vec![0; (nx * ny * nz).div_ceil(WORD)] })
     }
 
     /// Whether a place is met for the first time.

@@ -261,6 +261,11 @@ fn bad_input_is_refused() {
     let grid = Grid::axis_aligned([3, 3, 3], DVec3::ONE, DVec3::ZERO).expect("grid");
     let other = Grid::axis_aligned([3, 3, 3], DVec3::ONE, DVec3::X).expect("grid");
     let mask = Mask::from_fn(grid.clone(), |voxel| voxel == [1, 1, 1]);
+    let long = Grid::axis_aligned([9, 9, 9], DVec3::new(1e-3, 1e-3, 100.0), DVec3::ZERO).expect("a grid");
+    let all = Mask::from_fn(long.clone(), |voxel| voxel.iter().all(|c| (3..6).contains(c)));
+    let one = Skeleton::new(long, vec![[4, 4, 4]]);
+    let error = inscribed_spheres(&all, &one, &Params::default()).expect_err("no scan's");
+    assert!(matches!(error, Error::Uneven { .. }), "{error}");
     let measure = |skeleton| inscribed_spheres(&mask, &skeleton, &Params::default()).map(|_| ());
     assert_eq!(measure(Skeleton::new(grid.clone(), vec![[1, 1, 1]])), Ok(()));
     assert_eq!(measure(Skeleton::new(grid.clone(), vec![])), Err(Error::EmptySkeleton));

@@ -98,7 +98,7 @@ impl Scene {
     fn measured(&self, before: f64) -> Vec<[(usize, f64); 2]> {
         let (mask, skeleton) = self.mask(before);
         let of_mask = inscribed_spheres(&mask, &skeleton, &Params::default()).expect("spheres").spheres;
-        let found = walls((&mask, &skeleton), &of_mask, &self.scan()).expect("walls");
+        let found = walls((&mask, &skeleton), &of_mask, &self.scan(), &Params::default()).expect("walls");
         let InscribedSpheres(spheres) = found.spheres;
         let last = self.point([2 * N - 1, N - 1, N - 1]);
         spheres
@@ -141,6 +141,33 @@ fn radii_reach_to_the_wall_wherever_the_mask_ends() {
     }
 }
 
+/// What is added to the mask's radii does not move the wall in the scan.
+#[test]
+fn an_offset_of_the_mask_is_not_the_walls() {
+    let scene = Scene::new(DVec3::Z, DVec3::ONE, [(7.0, TRACHEA), (2.5, BRONCHUS)]);
+    let (mask, skeleton) = scene.mask(0.5);
+    let scan = scene.scan();
+    let radii = |offset_voxels: f64| -> Vec<f64> {
+        let params = Params { offset_voxels, ..Params::default() };
+        let of_mask = inscribed_spheres(&mask, &skeleton, &params).expect("spheres").spheres;
+        let found = walls((&mask, &skeleton), &of_mask, &scan, &params).expect("walls").spheres.0;
+        found.iter().map(|sphere| sphere.radius_mm + sphere.wall_mm).collect()
+    };
+    let (plain, moved) = (radii(0.0), radii(0.5));
+    assert!(plain.iter().zip(&moved).all(|(a, b)| (a - b).abs() < 0.1), "{plain:?} {moved:?}");
+}
+
+/// Of airways whose walls are all thinner than the blur no wall shows its value; that they are tissue is known.
+#[test]
+fn thin_walls_alone_are_measured_too() {
+    let thin = |thickness: f64| Tissue { thickness, ..BRONCHUS };
+    let scene = Scene::new(DVec3::Z, DVec3::ONE, [(6.0, thin(0.8)), (3.0, thin(0.5))]);
+    let errors = scene.measured(0.5);
+    for tube in [0, 1] {
+        assert!(mean(&errors, tube, 1).abs() <= 0.2, "{}", mean(&errors, tube, 1));
+    }
+}
+
 /// Between a thin bronchus and the lung the wall is a line as wide as the blur: its half lies well inside of the lumen.
 #[test]
 fn a_wall_thinner_than_the_blur_is_no_thicker_for_it() {
@@ -166,7 +193,7 @@ fn where_nothing_stands_out_radii_are_the_masks() {
     let scene = Scene::new(DVec3::Z, DVec3::ONE, [(6.0, flat), (3.0, flat)]);
     let (mask, skeleton) = scene.mask(0.0);
     let of_mask = inscribed_spheres(&mask, &skeleton, &Params::default()).expect("spheres").spheres;
-    let found = walls((&mask, &skeleton), &of_mask, &scene.scan()).expect("walls");
+    let found = walls((&mask, &skeleton), &of_mask, &scene.scan(), &Params::default()).expect("walls");
     assert!(found.spheres.0.iter().all(|sphere| sphere.wall_mm == 0.0));
     assert_eq!(found.report.get("walls"), Some(0.0));
     assert_eq!(found.report.warnings[0].code, "W-RADIUS-WALL");
@@ -176,7 +203,7 @@ fn where_nothing_stands_out_radii_are_the_masks() {
     for (grid, value) in [(scene.grid, f32::NAN), (nowhere, 7.0)] {
         let [nx, ny, nz] = grid.shape();
         let scan = Volume::new(grid, Voxels::F32(Array3::from_elem((nz, ny, nx), value)), 1.0, 0.0);
-        let found = walls((&mask, &skeleton), &of_mask, &scan).expect("walls").spheres;
+        let found = walls((&mask, &skeleton), &of_mask, &scan, &Params::default()).expect("walls").spheres;
         assert!(found.0.iter().all(|sphere| sphere.wall_mm == 0.0));
     }
 }
@@ -189,7 +216,9 @@ fn the_number_of_threads_does_not_matter() {
     let scan = scene.scan();
     let with = |n: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("a pool");
-        pool.install(|| walls((&mask, &skeleton), &of_mask, &scan).expect("walls").spheres.to_tsv())
+        pool.install(|| {
+            walls((&mask, &skeleton), &of_mask, &scan, &Params::default()).expect("walls").spheres.to_tsv()
+        })
     };
     assert_eq!(with(1), with(3));
 }

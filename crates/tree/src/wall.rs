@@ -10,8 +10,9 @@ use espalier_model::{InscribedSpheres, Node};
 use crate::graph::Sample;
 use crate::nearest::NearestSphere;
 
-/// What is left of a radius at least, where the wall lies inside the mask, as of a sphere's.
-const MOST_NARROWING: f64 = 0.5;
+/// What is left of a radius at least, where the wall lies inside the mask: a wall of a wider place beside it may be the
+/// nearest.
+const LEAST_SHARE: f64 = 0.5;
 
 /// Adds to each node's radius what the nearest sphere has beyond the mask.
 pub(crate) fn widen(nodes: &mut [Node], spheres: &InscribedSpheres) {
@@ -22,8 +23,7 @@ pub(crate) fn widen(nodes: &mut [Node], spheres: &InscribedSpheres) {
     let centers = NearestSphere::of(spheres.0.iter().map(|sphere| point(sphere.center_mm)));
     for node in nodes {
         if let Some((nearest, _)) = centers.look(point(node.position_mm), f64::INFINITY) {
-            let wall_mm = spheres.0[nearest].wall_mm;
-            node.radius_mm = (node.radius_mm + wall_mm).max(MOST_NARROWING * node.radius_mm);
+            node.radius_mm = (node.radius_mm + spheres.0[nearest].wall_mm).max(LEAST_SHARE * node.radius_mm);
         }
     }
 }

@@ -188,10 +188,10 @@ fn skeleton_and_tree(
     root: Root,
 ) -> Result<(Skeleton, Built), Box<dyn Error>> {
     let skeleton = espalier_skeleton::skeletonize(mask, &espalier_skeleton::Params::default())?.skeleton;
-    let mut spheres =
-        espalier_radius::inscribed_spheres(mask, &skeleton, &espalier_radius::Params::default())?.spheres;
+    let params = espalier_radius::Params::default();
+    let mut spheres = espalier_radius::inscribed_spheres(mask, &skeleton, &params)?.spheres;
     if let Some(scan) = scan {
-        spheres = espalier_radius::walls((mask, &skeleton), &spheres, scan)?.spheres;
+        spheres = espalier_radius::walls((mask, &skeleton), &spheres, scan, &params)?.spheres;
     }
     let params = espalier_tree::Params { root, ..espalier_tree::Params::default() };
     let built = espalier_tree::build(mask, &skeleton, &spheres, &params)?;

@@ -30,7 +30,11 @@ pub const PROFILE_COLUMNS: [Column; 8] = [
     Column::new("node", "n/a", "the node; the first of a branch is the fork or root that it starts from"),
     Column::new("from_start_mm", "mm", "path length from the start of the branch"),
     Column::new("from_root_mm", "mm", "path length from the root"),
-    Column::new("radius_mm", "mm", "radius of the inscribed sphere at the node"),
+    Column::new(
+        "radius_mm",
+        "mm",
+        "radius at the node: of the sphere inside the mask, or up to the wall that the scan shows",
+    ),
     Column::new(
         "area_radius_mm",
         "mm",

@@ -21,8 +21,8 @@ pub(super) fn radius(step: &mut Step<'_>) -> Result<Outcome, Error> {
     let (mut spheres, mut report) = (measured.spheres, measured.report);
     let scan = scan_of_walls::around(step, &mask)?;
     if let Some((scan, notes)) = &scan {
-        let walls =
-            espalier_radius::walls((&mask, &skeleton), &spheres, scan).map_err(|error| step.failed(error))?;
+        let walls = espalier_radius::walls((&mask, &skeleton), &spheres, scan, &step.config.radius)
+            .map_err(|error| step.failed(error))?;
         spheres = walls.spheres;
         report.warnings.extend(notes.warnings.clone());
         report.extend(walls.report);
@@ -33,7 +33,7 @@ pub(super) fn radius(step: &mut Step<'_>) -> Result<Outcome, Error> {
         "{:.2} to {:.2} mm{}",
         radii().fold(f64::INFINITY, f64::min),
         radii().fold(0.0, f64::max),
-        if scan.is_some() { ", to the wall in the scan" } else { "" }
+        if spheres.0.iter().any(|sphere| sphere.wall_mm != 0.0) { ", to the wall in the scan" } else { "" }
     );
     let single: Vec<f32> = radii().map(|radius_mm| radius_mm as f32).collect();
     let radius_image = nifti_out::skeleton_scalars(&skeleton, &single).map_err(|error| step.failed(error))?;

@@ -6,6 +6,8 @@
 //! rays reach beyond the surface the wall's, since the walls of thick airways are thicker than the blur; of fits in which the
 //! blur is free the blur. Where nothing is thick, all sections give the lumen's value and the peaks, and the blur is
 //! [`USUAL_BLUR`].
+//! **Why HU?** Where even the thickest airways lie in lung their walls are thinner than the blur, and a measured value would be
+//! too low. A lumen at [`AIR_HU`] says that values are HU; then a wall, which is soft tissue, has [`TISSUE_HU`] at least.
 //! **Notation** σ² = b² + [`VOXEL_VARIANCE`] · v²: the scanner's blur b, and that of voxels of length v and of the lines between
 //! their centres.
 
@@ -26,6 +28,9 @@ const THICKEST: f64 = 0.04;
 const LEAST_SECTIONS: usize = 20;
 /// The blur where none can be measured, in voxels.
 const USUAL_BLUR: f64 = 0.5;
+/// Values of air in HU, with the offsets of scanners; and of soft tissue without fat.
+const AIR_HU: std::ops::RangeInclusive<f64> = -1100.0..=-850.0;
+const TISSUE_HU: f64 = 0.0;
 /// A wall stands out from the lumen by this multiple of the noise.
 const LEAST_CONTRAST: f64 = 3.0;
 /// So does what is seen of it by this share of what a thick wall would show: a bronchus as bright as the lung around it, with no
@@ -53,6 +58,7 @@ impl Calibration {
         let lumen = median(telling.iter().map(|section| section.lumen).collect()).unwrap_or(0.0);
         let peaks = telling.iter().flat_map(|section| peaks(section, is_dark)).collect();
         let wall = median(peaks).unwrap_or(lumen);
+        let wall = if is_dark && AIR_HU.contains(&lumen) { wall.max(TISSUE_HU) } else { wall };
         let begin = Self { is_dark, lumen, wall, blur_mm: 0.0, least_contrast: LEAST_CONTRAST * noise };
         let of_section = |section: &&Section| begin.variances_mm2(section, disc);
         let variances: Vec<Vec<f64>> = thick.par_iter().map(of_section).collect();

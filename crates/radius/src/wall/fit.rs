@@ -29,6 +29,9 @@ const STEP_VOXELS: f64 = 0.05;
 const STEP_SHARE: f64 = 0.01;
 /// How far the radius may go from the mask's surface, in voxels.
 const REACH: [f64; 2] = [2.0, 4.0];
+/// How much more a bright lumen stands out than those of thick branches: without a limit a vessel thinner than the blur can be
+/// as thin as one likes, if it is bright enough.
+const MOST_CONTRAST: f64 = 1.25;
 /// The least radius, and what a blur may be, in voxels.
 const LEAST_RADIUS: f64 = 0.2;
 const BLUR: [f64; 2] = [0.2, 3.0];
@@ -119,6 +122,9 @@ impl Fit<'_> {
         tube.x = tube.x.clamp(least_mm, (surface_mm + REACH[1] * voxel_mm).max(least_mm));
         if self.known.is_dark {
             tube.y = tube.y.clamp(0.0, REACH[1] * voxel_mm);
+        } else {
+            let most = MOST_CONTRAST * (self.known.lumen - self.known.wall).abs();
+            tube.y = tube.y.clamp(tube.z - most, tube.z + most);
         }
         tube.w = tube.w.clamp(BLUR[0] * voxel_mm, BLUR[1] * voxel_mm);
         tube
