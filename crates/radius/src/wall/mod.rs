@@ -14,7 +14,7 @@
 //! farther than [`NEAR`] from the mask's surface, nor nearer to the axis than [`LEAST_LEFT`] of its radius.
 //! **Why not the half maximum?** Between an airway and a lung nearly as dark the wall is a thin bright line, blurred to the
 //! width of the blur, and the half of its height lies up to a voxel before it. On phantom airways at 1 mm the band's mask has
-//! a bias of −0.40 voxel, half maxima −0.27, the fit +0.03; at 0.5 mm −1.09, −0.51 and −0.11.
+//! a bias of −0.40 voxel, half maxima −0.27, the fit +0.04; at 0.5 mm −1.09, −0.51 and −0.17.
 //! **Source** the fit of a blurred model to rays across the airway: [Reinhardt1997].
 //! **Limits** where slices are thick only rays within them count. Lumina narrower than the blur are taken for that wide.
 //! **Cost** O(skeleton voxels · rays · (radius + 4 voxels)).
