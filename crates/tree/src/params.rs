@@ -123,8 +123,8 @@ pub struct Params {
     /// Larger prunes more.
     pub prune_min_mm: f64,
     /// Standard deviation of the Gaussian that smooths branches, in voxels along the branch (its largest
-    /// projected spacing). 0 to 4, 0 smooths nothing. Default 1, enough to take the voxel staircase away.
-    /// Larger cuts corners.
+    /// projected spacing). 0 to 4, 0 smooths nothing. Default 1, enough to take the voxel staircase away;
+    /// of a branch thicker than four voxels a quarter of its radius times this, as its axis wanders more. Larger cuts corners.
     pub smooth_voxels: f64,
     /// Where the free ends are; either way they are led along their tangent, since thinning ends them anywhere
     /// between the last sphere and the surface. Default `sphere`: the length of a tube with round ends is that of its

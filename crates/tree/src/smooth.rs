@@ -63,11 +63,11 @@ fn smoothed(samples: &[Sample], grid: &Grid, smooth_voxels: f64) -> Vec<Sample> 
             direction.dot(voxel_axes.z_axis.normalize()),
         );
         let sigma_mm = smooth_voxels * voxel_along_mm(direction_voxel, grid.spacing_mm());
-        let position_sigma_mm = sigma_mm.max(OF_RADIUS * smooth_voxels * samples[i].radius_mm);
-        out[i] = Sample {
-            position_mm: gaussian_at(samples, i, position_sigma_mm / step_mm).position_mm,
-            radius_mm: gaussian_at(samples, i, sigma_mm / step_mm).radius_mm,
-        };
+        out[i] = gaussian_at(samples, i, sigma_mm / step_mm);
+        let trunk_sigma_mm = OF_RADIUS * smooth_voxels * samples[i].radius_mm;
+        if trunk_sigma_mm > sigma_mm {
+            out[i].position_mm = gaussian_at(samples, i, trunk_sigma_mm / step_mm).position_mm;
+        }
     }
     out
 }
