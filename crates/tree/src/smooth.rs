@@ -4,7 +4,7 @@
 //! **Steps** 1. Space the samples evenly, two to the smallest spacing. 2. A Gaussian along the arc with σ =
 //! `smooth_voxels` voxels, of fourth order for positions and plain for radii. A voxel is the largest spacing projected on
 //! the local direction: on thick slices the staircase is as long as the slices are thick along the branch. Of thick branches
-//! σ for positions is [`OF_RADIUS`] of the radius, since their axis wanders by as much as their section is uneven. 3. Beyond
+//! σ for positions is [`OF_RADIUS`] of the radius, times `smooth_voxels`, since their axis wanders by as much as their section is uneven. 3. Beyond
 //! its ends a line goes on as its own point reflection, so that ends stay exactly where they are and straight
 //! lines stay straight.
 //! **Cost** O(N · σ / step).

@@ -1,8 +1,8 @@
 //! What hung together before slices were interpolated, joined again.
 //!
 //! **Input** the bits of a mask, those of it on thinner slices, and where among these the old slices lie. **Output** the
-//! new bits with threads added.
-//! **Steps** If the new mask has more pieces than the old one: 1. From the old voxels that are in pieces of the new mask, walk
+//! new bits with threads added, and how many pieces have grown together that did not touch.
+//! **Steps** If an old piece lies in several new ones: 1. From the old voxels that are in pieces of the new mask, walk
 //! breadth first over the other old voxels: each belongs to the piece from which it was reached. 2. Every two neighbours of
 //! different pieces are a way between them. Take the ways from the shortest to the longest; one that joins what nothing
 //! joins yet becomes a thread of voxels, along old ones.
@@ -32,14 +32,35 @@ impl Placed {
     }
 }
 
-/// Adds the threads; returns how many.
-pub(super) fn stitch(old: &Bits, new: &mut Bits, placed: Placed) -> usize {
+/// What has become of the pieces of a mask.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Stitched {
+    pub(super) n_threads: usize,
+    /// Old pieces less the new ones that hold them.
+    pub(super) n_grown_together: usize,
+}
+
+/// Adds the threads.
+pub(super) fn stitch(old: &Bits, new: &mut Bits, placed: Placed) -> Stitched {
     let runs = Runs::cut(new);
     let pieces = runs.components(Connectivity::All);
-    if pieces.n_components <= Runs::cut(old).components(Connectivity::All).n_components {
-        return 0;
-    }
     let piece_of = |voxel: [usize; 3]| runs.find(placed.of(voxel)).map(|run| pieces.of_run[run]);
+    let old_runs = Runs::cut(old);
+    let old_pieces = old_runs.components(Connectivity::All);
+    let mut piece_of_old: Vec<Option<usize>> = vec![None; old_pieces.n_components];
+    let mut together = UnionFind::new(old_pieces.n_components);
+    let mut old_of_piece: Vec<Option<usize>> = vec![None; pieces.n_components];
+    let (mut is_broken, mut n_grown_together) = (false, 0);
+    for voxel in old.voxels() {
+        let (Some(piece), Some(run)) = (piece_of(voxel), old_runs.find(voxel)) else { continue };
+        let own = old_pieces.of_run[run];
+        is_broken |= *piece_of_old[own].get_or_insert(piece) != piece;
+        let other = *old_of_piece[piece].get_or_insert(own);
+        n_grown_together += usize::from(together.join(own, other));
+    }
+    if !is_broken {
+        return Stitched { n_threads: 0, n_grown_together };
+    }
     let walk = Walk::over(old, piece_of);
     let mut sets = UnionFind::new(pieces.n_components);
     let mut n_threads = 0;
@@ -53,7 +74,7 @@ pub(super) fn stitch(old: &Bits, new: &mut Bits, placed: Placed) -> usize {
             way.windows(2).for_each(|step| thread(new, [placed.of(step[0]), placed.of(step[1])]));
         }
     }
-    n_threads
+    Stitched { n_threads, n_grown_together }
 }
 
 /// An old voxel that was reached.
@@ -188,9 +209,9 @@ mod tests {
         (0..4).for_each(|x| new.set([x, 2, 0]));
         (4..12).chain(15..20).for_each(|x| new.set([x, 3, 4]));
         let placed = Placed { axis: 2, factor: 4, first: 0 };
-        assert_eq!(stitch(&old, &mut new, placed), 2);
+        assert_eq!(stitch(&old, &mut new, placed).n_threads, 2);
         assert!((12..15).all(|x| new.get([x, 3, 4])), "along the old voxels");
         assert_eq!(Runs::cut(&new).components(Connectivity::All).n_components, 1);
-        assert_eq!(stitch(&old, &mut new, placed), 0);
+        assert_eq!(stitch(&old, &mut new, placed).n_threads, 0);
     }
 }
