@@ -135,7 +135,10 @@ fn read_sphere(line: &str) -> Result<Sphere, String> {
         radius_mm: length(4)?,
         distance_mm: length(5)?,
         area_radius_mm: if cells[6] == "n/a" { f64::NAN } else { length(6)? },
-        wall_mm: number(7)?.max(-length(4)?),
+        wall_mm: match number(7)? {
+            wall_mm if wall_mm < -length(4)? => return Err(format!("wall_mm is beyond the axis: {wall_mm}")),
+            wall_mm => wall_mm,
+        },
         is_cut: match cells[8] {
             "0" => false,
             "1" => true,
@@ -180,6 +183,7 @@ mod tests {
             (good.replace("\t0\n", "\n"), "line 3: 8 cells where 9 belong"),
             (good.replace("\t0.5\t", "\tinf\t"), "radius_mm is not a finite number: inf"),
             (good.replace("\t0.5\t", "\t-0.5\t"), "radius_mm is negative: -0.5"),
+            (good.replace("\t-0.125\t", "\t-0.625\t"), "wall_mm is beyond the axis: -0.625"),
             (good.replace("\t0\n", "\tno\n"), "is_cut is neither 0 nor 1: no"),
         ] {
             let error = InscribedSpheres::from_tsv(&bad).expect_err(message).to_string();

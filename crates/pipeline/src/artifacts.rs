@@ -119,14 +119,14 @@ impl Artifacts {
     pub(crate) fn scan_in_box(
         &self,
         lookup: Lookup<'_>,
-        (side, corners_mm): (SideFile, [DVec3; 2]),
+        (side, corners_mm, n_around): (SideFile, [DVec3; 2], u32),
     ) -> Result<(espalier_volume::Cropped, PathBuf), Error> {
         let side = self.side_paths.get(&side);
         let (path, options) = match side {
             Some(path) => (path.clone(), self.beside_options()),
             None => (self.locate(Artifact::Volume, lookup)?, self.read_options),
         };
-        let mut cropped = espalier_volume::read_box(&path, &options, corners_mm)
+        let mut cropped = espalier_volume::read_box(&path, &options, (corners_mm, n_around))
             .map_err(|error| Error::stage(lookup.stage)(Box::new(error)))?;
         if side.is_none() {
             // The volume stage has said it.

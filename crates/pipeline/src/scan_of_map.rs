@@ -80,7 +80,7 @@ pub(crate) fn check(config: &Config, source: &Source) -> Result<(), NoScan> {
 pub(crate) fn of_tree(step: &mut Step<'_>, tree: &Tree, params: &Params) -> Result<(Volume, Report), Error> {
     let corners_mm = box_of(tree, |radius_mm| params.volume.farthest_mm(radius_mm));
     let (cropped, path) =
-        step.take(|artifacts, lookup| artifacts.scan_in_box(lookup, (SideFile::Image, corners_mm)))?;
+        step.take(|artifacts, lookup| artifacts.scan_in_box(lookup, (SideFile::Image, corners_mm, 1)))?;
     let refused = |problem: NoScan| Error::file(&path, problem);
     let what = match cropped.kind {
         Kind::Mask { .. } => Some("a mask"),

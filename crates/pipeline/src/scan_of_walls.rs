@@ -16,8 +16,8 @@ use crate::error::Error;
 use crate::side_file::SideFile;
 use crate::steps::Step;
 
-/// How far around the mask the scan is read, in voxels of the mask.
-const MARGIN_VOXELS: f64 = 6.0;
+/// How far around the mask the scan is read, in its own voxels: the mask's are shorter where slices are thick.
+const MARGIN_VOXELS: u32 = 7;
 
 /// Why there is no scan with walls.
 #[derive(Debug, Error)]
@@ -83,7 +83,7 @@ fn is_wanted(config: &Config, source: &Source) -> bool {
 /// About how many voxels of the scan will be read for a mask: those of a scan with the mask's grid; 0 where none is wanted.
 pub(crate) fn n_voxels(config: &Config, source: &Source, mask: &Mask) -> u64 {
     let extent = |(first, last): ([usize; 3], [usize; 3])| -> f64 {
-        (0..3).map(|axis| (last[axis] - first[axis] + 1) as f64 + 2.0 * MARGIN_VOXELS).product()
+        (0..3).map(|axis| (last[axis] - first[axis] + 1) as f64 + f64::from(2 * MARGIN_VOXELS)).product()
     };
     let n_boxed = mask.bounding_box().map_or(0.0, extent).min(mask.grid().n_voxels() as f64);
     if is_wanted(config, source) { n_boxed as u64 } else { 0 }
@@ -95,7 +95,8 @@ pub(crate) fn around(step: &mut Step<'_>, mask: &Mask) -> Result<Option<(Volume,
     let wanted = is_wanted(step.config, step.source);
     let Some(corners_mm) = box_of(mask).filter(|_| wanted) else { return Ok(None) };
     let side = SideFile::WallImage;
-    let (cropped, path) = step.take(|artifacts, lookup| artifacts.scan_in_box(lookup, (side, corners_mm)))?;
+    let (cropped, path) =
+        step.take(|artifacts, lookup| artifacts.scan_in_box(lookup, (side, corners_mm, MARGIN_VOXELS)))?;
     let what = match cropped.kind {
         Kind::Mask { .. } => Some("a mask"),
         Kind::Constant { .. } => Some("one value everywhere"),
@@ -117,8 +118,8 @@ fn box_of(mask: &Mask) -> Option<[DVec3; 2]> {
     let to_world = mask.grid().world_from_voxel();
     let corner = |i: usize| {
         let along = |axis: usize| match i >> axis & 1 {
-            0 => first[axis] as f64 - MARGIN_VOXELS,
-            _ => last[axis] as f64 + MARGIN_VOXELS,
+            0 => first[axis] as f64,
+            _ => last[axis] as f64,
         };
         to_world.transform_point3(DVec3::new(along(0), along(1), along(2)))
     };

@@ -155,6 +155,9 @@ fn centreline(facts: &Facts<'_>) -> Vec<String> {
 fn walls(facts: &Facts<'_>) -> Option<String> {
     let count = |name| facts.count("radius", name);
     let (n_walls, n_spheres) = (count("walls")?, count("spheres")?);
+    if 2.0 * n_walls < n_spheres {
+        return Some("Radii keep to the mask: the scan shows too few walls.".to_owned());
+    }
     Some(format!(
         "Radii reach to the wall in the scan: a blurred tube was fitted to the values along rays across the branch \
          [Reinhardt1997], at {} of {} voxels; on average it lies {} mm beyond the mask.",

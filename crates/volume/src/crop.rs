@@ -2,7 +2,7 @@
 //!
 //! **Input** a path, as [`read`] takes it, and a box in RAS+ mm. **Output** [`Cropped`]: its voxels in single precision,
 //! and what kind of volume the whole is.
-//! **Steps** 1. the box in voxels, one more on each side for what interpolates between them; 2. the voxels straight from
+//! **Steps** 1. the box in voxels, and so many more on each side as are wanted, at least one for what interpolates between them; 2. the voxels straight from
 //! the file, of which only those are kept; 3. DICOM slices, and volumes whose axes must be made orthogonal, are read
 //! whole first.
 //! **Guarantees** straight from the file, memory is the box, else the volume and the box; checked before either is
@@ -34,18 +34,22 @@ pub struct Cropped {
     pub report: Report,
 }
 
-/// Reads what lies between two corners of the world.
+/// Reads what lies between two corners of the world, and `n_around` of the file's voxels on each side, at least one.
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_box(path: &Path, options: &ReadOptions, corners_mm: [DVec3; 2]) -> Result<Cropped, Error> {
+pub fn read_box(
+    path: &Path,
+    options: &ReadOptions,
+    (corners_mm, n_around): ([DVec3; 2], u32),
+) -> Result<Cropped, Error> {
     let named = |problem| Error::Read { problem, path: path.to_owned() };
     if !dicom::is_dicom(path).map_err(named)? {
         let mut report = Report::default();
         let mut stored = Stored::open(path, options, &mut report).map_err(named)?;
         if let Some(grid) = orthogonal_grid(&stored, options).map_err(named)? {
             count_grid(&grid, &mut report);
-            let part = Part::of(&grid, corners_mm);
+            let part = Part::of(&grid, (corners_mm, n_around));
             let kept = match &part {
                 Some(part) => part.read(&mut stored, (options, &mut report)).map_err(named)?,
                 None => Vec::new(),
@@ -55,7 +59,7 @@ pub fn read_box(path: &Path, options: &ReadOptions, corners_mm: [DVec3; 2]) -> R
     }
     let whole = read(path, options)?;
     let grid = whole.volume.grid();
-    let part = Part::of(grid, corners_mm);
+    let part = Part::of(grid, (corners_mm, n_around));
     let mut kept = match &part {
         Some(part) => part.room(whole.volume.n_bytes(), options).map_err(named)?,
         None => Vec::new(),
@@ -102,7 +106,7 @@ struct Part {
 
 impl Part {
     /// The voxels around a box; none where it lies outside.
-    fn of(grid: &Grid, [a, b]: [DVec3; 2]) -> Option<Self> {
+    fn of(grid: &Grid, ([a, b], n_around): ([DVec3; 2], u32)) -> Option<Self> {
         let voxel_from_world = grid.voxel_from_world();
         let corner = |i: usize| {
             let side = |axis: usize| if i >> axis & 1 == 0 { a[axis] } else { b[axis] };
@@ -111,7 +115,8 @@ impl Part {
         let (low, high) = (0..8)
             .map(corner)
             .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)));
-        let (low, high) = (low.floor() - 1.0, high.ceil() + 1.0);
+        let around = f64::from(n_around.max(1));
+        let (low, high) = (low.floor() - around, high.ceil() + around);
         let (mut first, mut shape) = ([0; 3], [0; 3]);
         for axis in 0..3 {
             let last = grid.shape()[axis] - 1;
@@ -207,7 +212,7 @@ mod tests {
         let whole = Volume::new(grid.clone(), Voxels::F32(array), 1.0, 0.0);
         std::fs::write(&path, espalier_model::nifti_out::volume(&whole).expect("bytes")).expect("write");
         let corners = [DVec3::new(-1.2, 2.0, 5.1), DVec3::new(1.9, 6.5, 7.9)];
-        let cropped = read_box(&path, &ReadOptions::default(), corners).expect("a part");
+        let cropped = read_box(&path, &ReadOptions::default(), (corners, 1)).expect("a part");
         assert!(matches!(cropped.kind, Kind::Ct { .. }));
         let part = cropped.volume.expect("voxels");
         // x runs to the left: 1.9 and -1.2 are 3.1 and 6.2; y is 2.5 to 4.75, z 2.07 to 3.93; one more on each side.
@@ -221,10 +226,10 @@ mod tests {
             assert_eq!(part.value(index), f64::from(value(voxel)), "{at}");
         }
         let beyond = [DVec3::splat(100.0), DVec3::splat(120.0)];
-        assert!(read_box(&path, &ReadOptions::default(), beyond).expect("none").volume.is_none());
+        assert!(read_box(&path, &ReadOptions::default(), (beyond, 1)).expect("none").volume.is_none());
         let tight = ReadOptions { max_bytes: 100, ..ReadOptions::default() };
         assert!(matches!(
-            read_box(&path, &tight, corners),
+            read_box(&path, &tight, (corners, 1)),
             Err(Error::Read { problem: ReadError::TooLarge { .. }, .. })
         ));
     }

@@ -430,6 +430,6 @@ fn a_part_counts_beside_the_whole() {
     // 64 slices of 30 pixels of 2 bytes, and what decoding one takes, are within 6000 bytes; the same in 4 bytes is not.
     let options = ReadOptions { max_bytes: 6000, ..ReadOptions::default() };
     assert!(read(folder.path(), &options).is_ok());
-    let error = read_box(folder.path(), &options, corners).map(drop).expect_err("too large");
+    let error = read_box(folder.path(), &options, (corners, 1)).map(drop).expect_err("too large");
     assert_eq!(error.code(), "E-VOLUME-TOO-LARGE");
 }

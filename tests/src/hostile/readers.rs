@@ -165,7 +165,7 @@ fn volume(name: &'static str, seeds: Vec<Seed>) -> Reader {
             })),
             _ => {
                 let corners = [DVec3::new(-3.0, -4.0, 1.0), DVec3::new(2.0, 3.0, 9.0)];
-                outcome(files(path, &options).and_then(|_| read_box(path, &options, corners)))
+                outcome(files(path, &options).and_then(|_| read_box(path, &options, (corners, 1))))
             }
         }
     })
